@@ -63,7 +63,8 @@ keys! {
         "position cycles in which the stream exceeded Vmax";
     STREAM_HELD_OFF = "stream_held_off", "", "true if a stream is ignored until it pauses";
     ENDPOINTS_DISCOVERED = "endpoints_discovered", "",
-        "appearances of remote endpoints since the start (publishers, subscriptions, two of each service and client); one that returns counts again";
+        "appearances of remote endpoints since the start or the last renewal of the DDS participant (publishers, subscriptions, two of each service and client); one that returns counts again";
+    PARTICIPANT_RENEWALS = "participant_renewals", "", "renewals of the DDS participant (`renewal_endpoints`)";
     MEMORY_MB = "memory_mb", "MB", "private memory of the process (RssAnon; Linux only)";
 }
 

@@ -44,6 +44,7 @@ impl Diagnostics {
         let axes = self.axes(before, now).map(|(joint, before, now)| self.axis(joint, before, now));
         let mut node = self.node_status(before, now, outputs_dropped);
         node.values.push(value(keys::ENDPOINTS_DISCOVERED, self.discovered.count()));
+        node.values.push(value(keys::PARTICIPANT_RENEWALS, self.discovered.renewals()));
         node.values.extend(private_memory_mb().map(|memory| value(keys::MEMORY_MB, format!("{memory:.1}"))));
         let status = std::iter::once(node).chain(axes).collect();
         DiagnosticArray { header: header(time), status }

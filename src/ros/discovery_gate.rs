@@ -14,8 +14,10 @@
 //!
 //! RustDDS has no interface for this. Its two threads, recognized by their names, pass the gate where they wait for
 //! events, in the `epoll_wait` of `virtual_axes_node`. In other programs, and in systems without epoll, the gate has
-//! no effect.
+//! no effect. When the participant is renewed ([`super::renewal`]), only the threads of the new one are held: those that
+//! reach the gate for the first time after it was closed.
 
+use std::cell::Cell;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
@@ -30,6 +32,11 @@ const EVENT_LOOP_PERIOD: Duration = Duration::from_micros(200);
 const TIMEOUT: Duration = Duration::from_secs(5);
 
 static GATE: Gate = Gate::new();
+
+thread_local! {
+    /// Number of closings of the gate before the thread first reached it.
+    static CLOSINGS: Cell<Option<u64>> = const { Cell::new(None) };
+}
 
 /// Closed gate of this process; opens on drop, within some 2 ms.
 ///
@@ -56,11 +63,20 @@ pub fn pass() -> bool {
     let thread = thread::current();
     let name = thread.name().unwrap_or_default();
     if name == DISCOVERY_THREAD {
-        GATE.pass_discovery();
+        GATE.pass_discovery(closings_at_first_pass());
         true
     } else {
-        !name.starts_with(EVENT_LOOP_THREAD) || GATE.pass_event_loop()
+        !name.starts_with(EVENT_LOOP_THREAD) || GATE.pass_event_loop(closings_at_first_pass())
     }
+}
+
+/// Returns the number of closings before this thread first reached the gate.
+fn closings_at_first_pass() -> u64 {
+    CLOSINGS.with(|closings| {
+        let first = closings.get().unwrap_or_else(|| GATE.lock().closings);
+        closings.set(Some(first));
+        first
+    })
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,10 +89,19 @@ enum Phase {
 #[derive(Debug)]
 struct State {
     phase: Phase,
+    /// Number of times that the gate has been closed.
+    closings: u64,
     /// Number of times that the discovery thread has come to the gate.
     discovery: u64,
     /// Number of times that the event loop has come to the gate.
     event_loop: u64,
+}
+
+impl State {
+    /// Returns true if the gate is not open for a participant that was created after `closings` closings.
+    fn holds(&self, closings: u64) -> bool {
+        self.phase != Phase::Open && closings == self.closings
+    }
 }
 
 #[derive(Debug)]
@@ -87,7 +112,7 @@ struct Gate {
 
 impl Gate {
     const fn new() -> Self {
-        let state = State { phase: Phase::Open, discovery: 0, event_loop: 0 };
+        let state = State { phase: Phase::Open, closings: 0, discovery: 0, event_loop: 0 };
         Gate { state: Mutex::new(state), changed: Condvar::new() }
     }
 
@@ -96,7 +121,9 @@ impl Gate {
     }
 
     fn close(&self) {
-        *self.lock() = State { phase: Phase::Closed, discovery: 0, event_loop: 0 };
+        let mut state = self.lock();
+        let closings = state.closings + 1;
+        *state = State { phase: Phase::Closed, closings, discovery: 0, event_loop: 0 };
     }
 
     /// Opens the gate. Without threads at the gate, this takes no time.
@@ -130,18 +157,20 @@ impl Gate {
         drop(self.changed.wait_timeout_while(state, TIMEOUT, |state| !condition(state)));
     }
 
-    fn pass_discovery(&self) {
+    /// Passes the discovery thread of the participant that was created after `closings` closings of the gate.
+    fn pass_discovery(&self, closings: u64) {
         let mut state = self.lock();
-        if state.phase != Phase::Open {
+        if state.holds(closings) {
             state.discovery += 1;
             self.changed.notify_all();
             drop(self.changed.wait_timeout_while(state, TIMEOUT, |state| state.phase == Phase::Closed));
         }
     }
 
-    fn pass_event_loop(&self) -> bool {
+    /// Passes the event loop of the participant that was created after `closings` closings of the gate.
+    fn pass_event_loop(&self, closings: u64) -> bool {
         let mut state = self.lock();
-        let is_open = state.phase == Phase::Open;
+        let is_open = !state.holds(closings);
         if !is_open {
             state.event_loop += 1;
             self.changed.notify_all();
@@ -183,14 +212,14 @@ mod tests {
             })
         };
         let event_loop = run(|gate, threads| {
-            let receives = gate.pass_event_loop();
+            let receives = gate.pass_event_loop(1);
             threads.receives.store(receives, Ordering::SeqCst);
             let announced = threads.announced.load(Ordering::SeqCst);
             assert!(!receives || announced == 20, "received with {announced} endpoints announced");
             threads.reported.store(threads.created.load(Ordering::SeqCst), Ordering::SeqCst);
         });
         let discovery = run(|gate, threads| {
-            gate.pass_discovery();
+            gate.pass_discovery(1);
             let reported = threads.reported.load(Ordering::SeqCst);
             assert!(reported == 20, "announced with {reported} endpoints reported");
             threads.announced.store(reported, Ordering::SeqCst);
@@ -215,7 +244,19 @@ mod tests {
         let gate = Gate::new();
         gate.close();
         gate.open();
-        assert!(gate.pass_event_loop());
+        assert!(gate.pass_event_loop(1));
+        assert!(began.elapsed() < TIMEOUT);
+    }
+    #[test]
+    fn a_closed_gate_holds_only_the_participant_created_after_it_was_closed() {
+        let gate = Gate::new();
+        gate.close();
+        gate.open();
+        gate.close();
+        assert!(gate.pass_event_loop(0) && gate.pass_event_loop(1));
+        assert!(!gate.pass_event_loop(2));
+        let began = std::time::Instant::now();
+        gate.pass_discovery(1);
         assert!(began.elapsed() < TIMEOUT);
     }
 }

@@ -6,11 +6,12 @@
 use futures::StreamExt;
 use rustdds::dds::CreateResult;
 use rustdds::policy::{Durability, History, Reliability};
-use rustdds::{DomainParticipant, QosPolicyBuilder, RTPSEntity, TopicKind, no_key};
+use rustdds::{DomainParticipant, QosPolicyBuilder, TopicKind, no_key};
 use serde::Deserialize;
 use tracing::{debug, warn};
 
 use super::names::NodeFqn;
+use super::own_participants::OwnParticipants;
 
 /// Discovery topic of rmw_dds_common.
 const TOPIC: &str = "ros_discovery_info";
@@ -40,27 +41,32 @@ struct NodeEntitiesInfo {
 }
 
 impl ParticipantEntitiesInfo {
-    /// Returns true if another participant than `own` announces a node with the name of `node`.
-    fn is_duplicate(&self, own: Gid, node: &NodeFqn) -> bool {
-        self.gid != own && self.nodes.iter().any(|n| n.namespace == node.namespace() && n.name == node.name())
+    /// Returns true if the participant does not belong to this process (`is_own`) and announces a node with the name of
+    /// `node`.
+    fn is_duplicate(&self, is_own: impl Fn(&Gid) -> bool, node: &NodeFqn) -> bool {
+        !is_own(&self.gid)
+            && self.nodes.iter().any(|n| n.namespace == node.namespace() && n.name == node.name())
     }
 }
 
-/// Subscribes to `ros_discovery_info`. The returned task logs one warning when another participant announces a node with
-/// the name of `node`.
-pub(super) fn watch(participant: &DomainParticipant, node: NodeFqn) -> impl Future<Output = ()> + use<> {
+/// Subscribes to `ros_discovery_info`. The returned task logs one warning when a participant that is not in `own`
+/// announces a node with the name of `node`.
+pub(super) fn watch(
+    participant: &DomainParticipant,
+    node: NodeFqn,
+    own: OwnParticipants,
+) -> impl Future<Output = ()> + use<> {
     let reader = subscribe(participant)
         .inspect_err(|error| {
             debug!("duplicate node names are not detected: cannot subscribe to {TOPIC}: {error}");
         })
         .ok();
-    let own = participant.guid().to_bytes();
     async move {
         let Some(reader) = reader else { return };
         let mut samples = reader.async_sample_stream();
         while let Some(sample) = samples.next().await {
             // Samples that cannot be decoded are ignored.
-            if sample.is_ok_and(|sample| sample.value().is_duplicate(own, &node)) {
+            if sample.is_ok_and(|sample| sample.value().is_duplicate(|gid| own.contains(gid), &node)) {
                 warn!(
                     "duplicate node name: another node in this domain is named {node}; rename one of them \
                      (-r __node:=NAME)"
@@ -100,9 +106,9 @@ mod tests {
         };
         let (own, other) = ([1; 16], [2; 16]);
         let node = NodeFqn::new("/cell", "mill").unwrap();
-        assert!(info(other, "/cell", "mill").is_duplicate(own, &node));
-        assert!(!info(own, "/cell", "mill").is_duplicate(own, &node));
-        assert!(!info(other, "/", "mill").is_duplicate(own, &node));
-        assert!(!info(other, "/cell", "lathe").is_duplicate(own, &node));
+        assert!(info(other, "/cell", "mill").is_duplicate(|gid| *gid == own, &node));
+        assert!(!info(own, "/cell", "mill").is_duplicate(|gid| *gid == own, &node));
+        assert!(!info(other, "/", "mill").is_duplicate(|gid| *gid == own, &node));
+        assert!(!info(other, "/cell", "lathe").is_duplicate(|gid| *gid == own, &node));
     }
 }

@@ -1,17 +1,20 @@
 //! Publishers and subscriptions of the node under their resolved names, with their QoS profiles.
 
 use std::collections::HashMap;
+use std::future::ready;
+use std::sync::Arc;
 
 use futures::{Stream, StreamExt, stream};
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
-use ros2_client::{MessageInfo, MessageTypeName, Node, ReadResult};
+use ros2_client::{Context, MessageInfo, MessageTypeName, Node, ReadResult};
 
 use rustdds::policy::ResourceLimits;
 use rustdds::{DomainParticipant, QosPolicies, QosPolicyBuilder, Topic, TopicKind};
 
 use super::args::RosArgs;
 use super::recorder::{Direction, Tap, TopicRecorder};
-use super::service::Wire;
+use super::renewable::{DeliveredSamples, EndpointContext, Renewable};
+use super::service_endpoints::Wire;
 use crate::interface::{self, TopicQos};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -47,14 +50,22 @@ pub(super) fn dds_topic_name(name: &str) -> String {
 
 /// Subscription with its tap for the recording.
 pub struct Subscription<M: Serialize + DeserializeOwned + 'static> {
-    network: ros2_client::Subscription<Wire<M>>,
+    network: Arc<Renewable<ros2_client::Subscription<Wire<M>>>>,
     tap: Tap<M>,
 }
 
 impl<M: Recorded + DeserializeOwned + Send + Sync + 'static> Subscription<M> {
     /// Returns the messages in order of reception and records them.
     pub fn async_stream(&self) -> impl Stream<Item = ReadResult<(M, MessageInfo)>> + '_ {
-        in_reception_order(self.network.async_stream()).then(async |received| {
+        let received = self.network.items(|network| async move { network.async_take().await });
+        let mut delivered = DeliveredSamples::default();
+        let received = received.filter_map(move |(reader, received)| {
+            let is_new = received.as_ref().map_or(true, |(_, info)| {
+                delivered.insert(info.publisher_gid().to_bytes16(), info.sequence_number(), reader)
+            });
+            ready(is_new.then_some(received))
+        });
+        in_reception_order(received).then(async |received| {
             let (Wire(message), info) = received?;
             self.tap.record(&message).await;
             Ok((message, info))
@@ -164,7 +175,7 @@ const OTHER_TOPICS: [interface::Topic; 2] = [interface::ROSOUT, interface::PARAM
 /// Factory for the topics of a node.
 pub struct Endpoints<'a> {
     node: &'a mut Node,
-    participant: &'a DomainParticipant,
+    context: &'a EndpointContext,
     args: &'a RosArgs,
     parameters: &'a Parameters,
     recorder: &'a mut TopicRecorder,
@@ -175,12 +186,12 @@ pub struct Endpoints<'a> {
 }
 
 impl<'a> Endpoints<'a> {
-    /// Creates a factory for topics of `node`, which belongs to `participant`.
+    /// Creates a factory for topics of `node`, which belongs to `context`.
     ///
     /// `args` resolve the names, `parameters` define the QoS, and `recorder` records the messages.
     pub fn new(
         node: &'a mut Node,
-        participant: &'a DomainParticipant,
+        context: &'a EndpointContext,
         args: &'a RosArgs,
         parameters: &'a Parameters,
         recorder: &'a mut TopicRecorder,
@@ -189,7 +200,7 @@ impl<'a> Endpoints<'a> {
         let known = OTHER_TOPICS.iter().filter_map(|topic| {
             Some((args.resolve_topic(topic.name).ok()?, (topic.name, topic.type_name())))
         });
-        Endpoints { node, participant, args, parameters, recorder, is_blocking, known: known.collect() }
+        Endpoints { node, context, args, parameters, recorder, is_blocking, known: known.collect() }
     }
 
     fn qos(&self, topic: &interface::Topic) -> Result<QosConfig, EndpointError> {
@@ -204,24 +215,17 @@ impl<'a> Endpoints<'a> {
         })
     }
 
-    /// Creates a topic under its resolved name, which can carry one type only.
-    fn topic(
-        &mut self,
-        topic: &interface::Topic,
-        qos: &QosPolicies,
-    ) -> Result<(Topic, String), EndpointError> {
+    /// Returns the resolved name of a topic, which can carry one type only.
+    fn resolve(&mut self, topic: &interface::Topic) -> Result<String, EndpointError> {
         let name = topic.name;
-        let failed = |reason: String| EndpointError::NotCreated { name: name.to_owned(), reason };
-        let resolved = self.args.resolve_topic(name).map_err(|e| failed(e.to_string()))?;
+        let resolved = self.args.resolve_topic(name).map_err(|e| not_created(topic, e.to_string()))?;
         let wanted = topic.type_name();
         let (first, carried) = self.known.entry(resolved.clone()).or_insert_with(|| (name, wanted.clone()));
         if *carried != wanted {
             let carried = carried.clone();
             return Err(EndpointError::TopicTypeConflict { resolved, first, carried, name, wanted });
         }
-        let type_name = MessageTypeName::new(topic.package, topic.message);
-        let topic = create_topic(self.participant, &resolved, &type_name, qos).map_err(failed)?;
-        Ok((topic, resolved))
+        Ok(resolved)
     }
 
     /// Creates a publisher; returns it with its resolved name.
@@ -232,11 +236,14 @@ impl<'a> Endpoints<'a> {
         &mut self,
         description: &interface::Topic,
     ) -> Result<(Publisher<M>, String), EndpointError> {
+        let failed = |reason| not_created(description, reason);
         let qos = self.qos(description)?;
         let max_unacknowledged = if self.is_blocking { blocking_window(qos) } else { MAX_UNACKNOWLEDGED };
-        let (topic, resolved) =
-            self.topic(description, &with_sample_limit(&profile(qos), max_unacknowledged))?;
-        let failed = |reason: String| EndpointError::NotCreated { name: description.name.to_owned(), reason };
+        let resolved = self.resolve(description)?;
+        let type_name = MessageTypeName::new(description.package, description.message);
+        let limited = with_sample_limit(&profile(qos), max_unacknowledged);
+        let participant = self.context.domain_participant();
+        let topic = create_topic(&participant, &resolved, &type_name, &limited).map_err(failed)?;
         let network = self.node.create_publisher(&topic, None).map_err(|e| failed(e.to_string()))?;
         let tap = self.recorder.tap(&resolved, qos, Direction::Out);
         let is_volatile = !qos.is_transient_local;
@@ -248,15 +255,25 @@ impl<'a> Endpoints<'a> {
     ///
     /// # Errors
     /// [`EndpointError`] naming the topic.
-    pub fn subscription<M: Recorded + DeserializeOwned + 'static>(
+    pub fn subscription<M: Recorded + DeserializeOwned + Send + Sync + 'static>(
         &mut self,
         description: &interface::Topic,
     ) -> Result<(Subscription<M>, String), EndpointError> {
         let qos = self.qos(description)?;
-        let (topic, resolved) = self.topic(description, &QosPolicies::from(&profile(qos)))?;
-        let failed = |reason: String| EndpointError::NotCreated { name: description.name.to_owned(), reason };
-        let network = self.node.create_subscription(&topic, None).map_err(|e| failed(e.to_string()))?;
-        let tap = self.recorder.tap(&resolved, qos, Direction::In);
-        Ok((Subscription { network, tap }, resolved))
+        let name = self.resolve(description)?;
+        let type_name = MessageTypeName::new(description.package, description.message);
+        let (resolved, limits) = (name.clone(), QosPolicies::from(&profile(qos)));
+        let create = move |node: &mut Node, context: &Context| {
+            let topic = create_topic(&context.domain_participant(), &resolved, &type_name, &limits)?;
+            node.create_subscription(&topic, None).map_err(|e| e.to_string())
+        };
+        let network = Renewable::create(self.node, self.context, create)
+            .map_err(|reason| not_created(description, reason))?;
+        let tap = self.recorder.tap(&name, qos, Direction::In);
+        Ok((Subscription { network, tap }, name))
     }
+}
+
+fn not_created(topic: &interface::Topic, reason: String) -> EndpointError {
+    EndpointError::NotCreated { name: topic.name.to_owned(), reason }
 }

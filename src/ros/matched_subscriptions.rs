@@ -6,14 +6,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use futures::StreamExt;
-use rustdds::{DomainParticipant, DomainParticipantStatusEvent, GUID, LostReason, RTPSEntity, StatusEvented};
+use rustdds::{DomainParticipant, DomainParticipantStatusEvent, GUID, LostReason, StatusEvented};
 
 use tracing::debug;
 
 use super::announcement_eviction::AnnouncementEviction;
 use super::first_sample_nack::FirstSampleNack;
-use super::remote_endpoints::{DiscoveredEndpoints, RemoteEndpoints};
+use super::own_participants::OwnParticipants;
+use super::remote_endpoints::{EndpointCounter, RemoteEndpoints};
 use super::remote_participants::RemoteParticipants;
+use super::rtps::Guid;
 
 /// Period at which topics without readers are detected. A new reader is reported by an event at once.
 const POLL_PERIOD: Duration = Duration::from_secs(1);
@@ -39,10 +41,10 @@ impl MatchedSubscriptions {
 }
 
 /// Topics whose matched subscriptions are tracked.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub struct MatchedSubscriptionTracker(Vec<TrackedTopic>);
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct TrackedTopic {
     writer: GUID,
     /// Name of the topic in DDS.
@@ -76,48 +78,65 @@ impl MatchedSubscriptionTracker {
     }
 }
 
-/// Handles the status events of the participant until the task is aborted: updates the matched subscriptions,
-/// requests the first sample of matched writers, counts discovered endpoints, and records the participants.
+/// Handling of the status events of a participant: updates the matched subscriptions, requests the first sample of
+/// matched writers, counts discovered endpoints, and records the participants.
 ///
-/// A participant delivers each event to one listener only, so this task handles all of them.
-pub(super) async fn run(
-    participant: DomainParticipant,
-    tracker: MatchedSubscriptionTracker,
-    discovered: DiscoveredEndpoints,
-    participants: RemoteParticipants,
-) {
-    let first_sample = FirstSampleNack::open();
-    let mut eviction = AnnouncementEviction::default();
-    let mut remote = RemoteEndpoints::new(participant.guid(), discovered);
-    let status = participant.status_listener();
-    let mut events = status.as_async_status_stream();
-    let mut timer = tokio::time::interval(POLL_PERIOD);
-    loop {
-        tokio::select! {
-            event = events.next() => match event {
-                Some(DomainParticipantStatusEvent::RemoteReaderMatched { local_writer, .. }) => {
-                    // The writer of a rotated topic is not in the list.
-                    if !tracker.record_match(local_writer) {
-                        tracker.poll(&participant);
+/// A participant delivers each event to one listener only, so one task handles all of them.
+pub(super) struct DiscoveryEvents {
+    /// Participant that discovers.
+    pub participant: DomainParticipant,
+    /// Topics whose matched subscriptions are tracked.
+    pub tracker: MatchedSubscriptionTracker,
+    /// Participants of this process.
+    pub own: OwnParticipants,
+    /// Counter of the discovered endpoints.
+    pub counter: Arc<EndpointCounter>,
+    /// Other participants.
+    pub participants: RemoteParticipants,
+    /// True while the node uses this participant. Before and after, no flag is changed and no sample requested.
+    pub is_current: Arc<AtomicBool>,
+}
+
+impl DiscoveryEvents {
+    /// Handles the events until the task is aborted.
+    pub(super) async fn run(self) {
+        let DiscoveryEvents { participant, tracker, own, counter, participants, is_current } = self;
+        let is_current = || is_current.load(Ordering::Relaxed);
+        let first_sample = FirstSampleNack::open();
+        let mut eviction = AnnouncementEviction::default();
+        let mut remote = RemoteEndpoints::new(|guid: &Guid| own.contains(guid), counter);
+        let status = participant.status_listener();
+        let mut events = status.as_async_status_stream();
+        let mut timer = tokio::time::interval(POLL_PERIOD);
+        loop {
+            tokio::select! {
+                event = events.next() => match event {
+                    Some(DomainParticipantStatusEvent::RemoteReaderMatched { local_writer, .. }) => {
+                        // The writer of a rotated topic is not in the list.
+                        if is_current() && !tracker.record_match(local_writer) {
+                            tracker.poll(&participant);
+                        }
                     }
-                }
-                Some(DomainParticipantStatusEvent::RemoteWriterMatched { local_reader, remote_writer }) => {
-                    if let Some(nack) = &first_sample {
-                        nack.request_first_sample(&participant, local_reader, remote_writer);
+                    Some(DomainParticipantStatusEvent::RemoteWriterMatched { local_reader, remote_writer }) => {
+                        if let Some(nack) = first_sample.as_ref().filter(|_| is_current()) {
+                            nack.request_first_sample(&participant, local_reader, remote_writer);
+                        }
                     }
-                }
-                Some(event) => {
-                    remote.update(&event);
-                    participants.update(&event, Instant::now());
-                    if is_expired(&event)
-                        && let Err(error) = eviction.evict(&participant)
-                    {
-                        debug!("a participant that returns may stay undiscovered: {error}");
+                    Some(event) => {
+                        remote.update(&event);
+                        participants.update(&event, Instant::now());
+                        if is_expired(&event)
+                            && let Err(error) = eviction.evict(&participant)
+                        {
+                            debug!("a participant that returns may stay undiscovered: {error}");
+                        }
                     }
-                }
-                None => return,
-            },
-            _ = timer.tick() => tracker.poll(&participant),
+                    None => return,
+                },
+                _ = timer.tick() => if is_current() {
+                    tracker.poll(&participant);
+                },
+            }
         }
     }
 }

@@ -15,6 +15,7 @@
 //! | `announcement_eviction` | DATA with key | discovers a participant again that returns after its lease has expired |
 //! | `static_peers` | those of RustDDS | announces the participant to other hosts without multicast |
 //! | `discovery_gate` | – | delays discovery until all endpoints exist |
+//! | `renewal` | – | releases the memory of departed endpoints |
 //! | `writer_rotation` | – | bounds the memory of a volatile writer; matches the readers of a returned participant |
 
 mod action;
@@ -41,6 +42,7 @@ mod matched_subscriptions;
 pub mod node;
 mod outputs;
 mod overflow;
+mod own_participants;
 mod pace;
 mod parameter_host;
 pub mod parameter_services;
@@ -50,18 +52,22 @@ mod readers;
 mod recorder;
 mod remote_endpoints;
 mod remote_participants;
+mod renewable;
+mod renewal;
 mod response_limiter;
 mod results;
 pub mod rosout;
 mod rtps;
 pub mod security;
 mod service;
+mod service_endpoints;
 mod setpoints;
 mod stalled_readers;
 mod static_peers;
 mod stream;
 mod throttle;
 mod tool;
+mod topic_writers;
 mod topics;
 mod trigger;
 mod writer_rotation;

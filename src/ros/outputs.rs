@@ -6,21 +6,22 @@
 use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use futures::FutureExt;
-use rustdds::qos::HasQoSPolicy;
 use rustdds::{DomainParticipant, TopicDescription};
 use serde::Serialize;
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::timeout;
+use tracing::warn;
 
 use super::endpoints::Publisher;
 use super::matched_subscriptions::{MatchedSubscriptionTracker, MatchedSubscriptions};
 use super::overflow::OverflowPolicy;
 use super::recorder::Tap;
-use super::writer_rotation::{RotatedTopics, Writer, WriterRotation};
+use super::topic_writers::{RotatedTopic, TopicWriters};
+use super::writer_rotation::RotatedTopics;
 
 /// Length of a queue that drops: 1.5 s of messages at the default rate.
 const DROPPING_QUEUE: usize = 256;
@@ -53,7 +54,7 @@ type Write = Pin<Box<dyn Future<Output = ()> + Send>>;
 
 /// Output of a topic.
 pub struct Output<M: Serialize> {
-    writers: Arc<WriterRotation<Writer<M>>>,
+    writers: Arc<TopicWriters<M>>,
     queue: Queue,
     tap: Tap<M>,
     matched: MatchedSubscriptions,
@@ -140,33 +141,41 @@ pub struct OutputFactory<'a> {
 
 impl OutputFactory<'_> {
     /// Starts the task that writes queued messages of a topic; it ends when the output is dropped.
-    pub fn start<M: Serialize + Send + Sync + 'static>(
+    pub fn start<M: Serialize + Clone + Send + Sync + 'static>(
         &mut self,
         publisher: Publisher<M>,
         overflow: OverflowPolicy,
     ) -> Output<M> {
-        let Publisher { network, tap, topic, is_volatile, max_unacknowledged } = publisher;
-        let matched = if is_volatile && !tap.is_recording() {
-            self.tracker.add(network.guid(), topic.name())
+        let is_tracked = publisher.is_volatile && !publisher.tap.is_recording();
+        let matched = if is_tracked {
+            self.tracker.add(publisher.network.guid(), publisher.topic.name())
         } else {
             MatchedSubscriptions::always()
         };
-        let writers =
-            Arc::new(WriterRotation::new(Writer::new(network, &topic, max_unacknowledged, self.participant)));
+        let (writers, tap) = self.writers(publisher);
         let stall_timeout = stall_timeout(overflow);
         let stalled = Arc::clone(&writers);
         let (queue, task) = Queue::new(overflow, self.dropped, stall_timeout, move || {
             stalled.current().readers.send_gap(stall_timeout.as_secs())
         });
         self.tasks.spawn(task);
-        if topic.qos().is_volatile() {
-            self.rotated.add(Arc::clone(&writers), topic, max_unacknowledged, self.participant.clone());
-        }
         Output { writers, queue, tap, matched }
+    }
+
+    /// Returns the writers of a topic that is published without a queue, and its tap.
+    pub(super) fn writers<M: Serialize + Clone + Send + Sync + 'static>(
+        &mut self,
+        publisher: Publisher<M>,
+    ) -> (Arc<TopicWriters<M>>, Tap<M>) {
+        let Publisher { network, tap, topic, max_unacknowledged, .. } = publisher;
+        let writers = TopicWriters::new(network, topic, max_unacknowledged, self.participant.clone());
+        let writers = Arc::new(writers);
+        self.rotated.add(Arc::clone(&writers) as Arc<dyn RotatedTopic>);
+        (writers, tap)
     }
 }
 
-impl<M: Serialize + Send + Sync + 'static> Output<M> {
+impl<M: Serialize + Clone + Send + Sync + 'static> Output<M> {
     /// Returns true if the topic has a matched subscription, is transient local, or is recorded; otherwise the
     /// message need not be built.
     pub fn has_subscriptions(&self) -> bool {
@@ -177,13 +186,19 @@ impl<M: Serialize + Send + Sync + 'static> Output<M> {
     pub async fn send(&self, message: M) {
         self.tap.record(&message).await;
         let writers = Arc::clone(&self.writers);
-        let write = Box::pin(async move { writers.advance(Instant::now).write(message).await });
+        let write = Box::pin(async move {
+            if !writers.write(message).await {
+                warn!("a message could not be published");
+            }
+        });
         self.queue.write(write).await;
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::Instant;
+
     use super::*;
     use futures::future::pending;
     use tokio::sync::watch;

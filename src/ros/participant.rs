@@ -2,11 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use ros2_client::Context;
+use ros2_client::{Context, Node, NodeName, NodeOptions};
 use rustdds::DomainParticipant;
 #[cfg(feature = "security")]
 use rustdds::DomainParticipantSecurityConfigFiles;
 
+use super::args::RosArgs;
 use super::environment::{DiscoveryRange, Environment};
 #[cfg(not(feature = "security"))]
 use super::security::SecurityError;
@@ -31,6 +32,15 @@ pub enum ParticipantError {
     },
 }
 
+/// Creates a ROS node with the name in `args`; parameter services and `/rosout` are not those of ros2-client. Returns
+/// the reason of the middleware if it fails.
+pub(super) fn create_node(context: &Context, args: &RosArgs) -> Result<Node, String> {
+    let name =
+        NodeName::new(args.node().namespace(), args.node().name()).map_err(|error| format!("{error:?}"))?;
+    let options = NodeOptions::new().start_parameter_services(false).enable_rosout(false);
+    context.new_node(name, options).map_err(|error| error.to_string())
+}
+
 /// Owner of the DDS participant, which is disposed of on drop.
 ///
 /// Drop publishers, subscriptions, the node and the [`Context`] first, then call [`Self::shutdown`] or drop this
@@ -40,6 +50,7 @@ pub enum ParticipantError {
 pub struct Participant {
     participant: Option<DomainParticipant>,
     environment: Environment,
+    security: Security,
 }
 
 impl Participant {
@@ -81,7 +92,24 @@ impl Participant {
             domain_id: environment.domain_id(),
             reason: error.to_string(),
         })?;
-        Ok(Self { participant: Some(participant), environment: environment.clone() })
+        Ok(Self {
+            participant: Some(participant),
+            environment: environment.clone(),
+            security: security.clone(),
+        })
+    }
+
+    /// Opens another participant in the same domain, on the same networks and with the same DDS Security.
+    ///
+    /// # Errors
+    /// [`ParticipantError::Open`] if sockets or threads are not available.
+    pub fn open_another(&self) -> Result<Self, ParticipantError> {
+        Self::open_with(&self.environment, &self.security)
+    }
+
+    /// Returns the DDS participant, or `None` after the shutdown.
+    pub fn dds(&self) -> Option<&DomainParticipant> {
+        self.participant.as_ref()
     }
 
     /// Creates a ROS context on this participant.

@@ -1,28 +1,32 @@
-//! Endpoints of other participants: those present now, and the number discovered since the start.
+//! Endpoints of other processes: those present now, and the number discovered since the start or the last renewal of
+//! the participant.
 //!
-//! RustDDS keeps some data of each discovered endpoint until the process ends, so the number determines memory use.
+//! RustDDS keeps some data of each discovered endpoint until its participant is dropped, so the number of departed ones
+//! determines memory use.
 
 use std::collections::HashSet;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rustdds::{DomainParticipantStatusEvent, GUID};
 use tracing::warn;
+
+use super::rtps::Guid;
 
 /// Number of discovered endpoints between two warnings about their memory use.
 const WARN_EVERY: u64 = 100_000;
 /// Memory that the middleware keeps for an endpoint that has left, kB (docs/internals/middleware.md).
 const RETAINED_KB: f64 = 0.83;
 
-/// Shared counter of remote endpoints discovered since the start.
+/// Counter of the remote endpoints that a participant has discovered.
 ///
 /// A publisher and a subscription count as one endpoint each, a service and a client as two.
-#[derive(Debug, Clone, Default)]
-pub struct DiscoveredEndpoints(Arc<AtomicU64>);
+#[derive(Debug, Default)]
+pub struct EndpointCounter(AtomicU64);
 
-impl DiscoveredEndpoints {
-    /// Returns the number of endpoints discovered since the start.
-    pub fn count(&self) -> u64 {
+impl EndpointCounter {
+    /// Returns the number of discovered endpoints.
+    pub(super) fn count(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }
 
@@ -31,11 +35,49 @@ impl DiscoveredEndpoints {
         let count = self.0.fetch_add(1, Ordering::Relaxed) + 1;
         if count.is_multiple_of(WARN_EVERY) {
             warn!(
-                "{count} remote endpoints discovered since the start (one per publisher and subscription, two per \
-                 service and client); the middleware retains up to {:.0} MB for those that have left until this node exits",
+                "{count} remote endpoints discovered (one per publisher and subscription, two per service and client); \
+                 the middleware retains up to {:.0} MB for those that have left until the participant is renewed at \
+                 rest or this node exits",
                 count as f64 * RETAINED_KB * 1e-3
             );
         }
+    }
+}
+
+/// Shared counter of the current participant, with the number of renewals.
+#[derive(Debug, Clone, Default)]
+pub struct DiscoveredEndpoints(Arc<Mutex<CurrentCounter>>);
+
+#[derive(Debug, Default)]
+struct CurrentCounter {
+    counter: Arc<EndpointCounter>,
+    renewals: u64,
+}
+
+impl DiscoveredEndpoints {
+    fn lock(&self) -> MutexGuard<'_, CurrentCounter> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Sets the counter of the first participant.
+    pub(super) fn set(&self, counter: Arc<EndpointCounter>) {
+        self.lock().counter = counter;
+    }
+
+    /// Sets the counter of the participant after a renewal.
+    pub(super) fn renew(&self, counter: Arc<EndpointCounter>) {
+        let mut current = self.lock();
+        *current = CurrentCounter { counter, renewals: current.renewals + 1 };
+    }
+
+    /// Returns the number of endpoints discovered since the start or the last renewal of the participant.
+    pub fn count(&self) -> u64 {
+        self.lock().counter.count()
+    }
+
+    /// Returns the number of renewals of the participant since the start.
+    pub fn renewals(&self) -> u64 {
+        self.lock().renewals
     }
 }
 
@@ -44,18 +86,17 @@ impl DiscoveredEndpoints {
 /// The middleware repeats the event of an endpoint when its announcement is repeated, and when a matching local
 /// endpoint is created. An endpoint that leaves before its event stays until its participant leaves. Events beyond
 /// 2048 at a time are lost.
-#[derive(Debug)]
-pub struct RemoteEndpoints {
-    /// GUID of the participant of this node.
-    own: GUID,
+pub struct RemoteEndpoints<F> {
+    /// Function that returns true for endpoints of this process.
+    is_own: F,
     present: HashSet<GUID>,
-    discovered: DiscoveredEndpoints,
+    counter: Arc<EndpointCounter>,
 }
 
-impl RemoteEndpoints {
-    /// Creates an empty set; endpoints of the participant `own` are ignored.
-    pub fn new(own: GUID, discovered: DiscoveredEndpoints) -> Self {
-        RemoteEndpoints { own, present: HashSet::new(), discovered }
+impl<F: Fn(&Guid) -> bool> RemoteEndpoints<F> {
+    /// Creates an empty set; endpoints of this process, for which `is_own` returns true, are ignored.
+    pub fn new(is_own: F, counter: Arc<EndpointCounter>) -> Self {
+        RemoteEndpoints { is_own, present: HashSet::new(), counter }
     }
 
     /// Updates the set by a status event.
@@ -75,8 +116,8 @@ impl RemoteEndpoints {
     }
 
     fn insert(&mut self, guid: GUID) {
-        if guid.prefix != self.own.prefix && self.present.insert(guid) {
-            self.discovered.increment();
+        if !(self.is_own)(&guid.to_bytes()) && self.present.insert(guid) {
+            self.counter.increment();
         }
     }
 }
@@ -96,8 +137,9 @@ mod tests {
             GUID::from_bytes(bytes)
         };
         let (own, one, other) = (endpoint(1, 1), endpoint(2, 1), endpoint(2, 2));
-        let discovered = DiscoveredEndpoints::default();
-        let mut remote = RemoteEndpoints::new(own, discovered.clone());
+        let (discovered, counter) = (DiscoveredEndpoints::default(), Arc::<EndpointCounter>::default());
+        discovered.set(Arc::clone(&counter));
+        let mut remote = RemoteEndpoints::new(|guid: &Guid| guid[..12] == own.to_bytes()[..12], counter);
         [own, one, other, one, one, other].into_iter().for_each(|guid| remote.insert(guid));
         assert_eq!(discovered.count(), 2);
         remote.update(&ReaderLost { guid: one, reason: LostReason::Disposed });
@@ -112,6 +154,8 @@ mod tests {
         assert_eq!(remote.present.len(), 0);
         [one, other].into_iter().for_each(|guid| remote.insert(guid));
         assert_eq!(discovered.count(), 6);
+        discovered.renew(Arc::default());
+        assert_eq!((discovered.count(), discovered.renewals()), (0, 1));
     }
 
     #[test]
@@ -139,10 +183,10 @@ mod tests {
 
         let text = Text::default();
         let subscriber = tracing_subscriber::fmt().with_writer(text.clone()).finish();
-        let discovered = DiscoveredEndpoints::default();
-        tracing::subscriber::with_default(subscriber, || (0..250_000).for_each(|_| discovered.increment()));
+        let counter = EndpointCounter::default();
+        tracing::subscriber::with_default(subscriber, || (0..250_000).for_each(|_| counter.increment()));
         let log = String::from_utf8(text.0.lock().expect("not poisoned").clone()).expect("text");
-        assert_eq!(discovered.count(), 250_000);
+        assert_eq!(counter.count(), 250_000);
         assert_eq!(log.lines().count(), 2, "{log}");
         assert!(log.contains("100000 remote endpoints") && log.contains("83 MB"), "{log}");
     }

@@ -2,6 +2,7 @@
 //!
 //! The publisher of ros2-client keeps one message for late joiners; this one keeps as many as rcl's.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
@@ -14,7 +15,8 @@ use tokio::sync::mpsc;
 use super::args::{LogLevel, RosArgs};
 use super::endpoints::{EndpointError, Publisher, create_topic, with_sample_limit};
 use super::log::LogRecord;
-use super::recorder::{Direction, TopicRecorder};
+use super::recorder::{Direction, Tap, TopicRecorder};
+use super::topic_writers::TopicWriters;
 use crate::interface::{ROSOUT, ROSOUT_QOS, Topic};
 
 /// Capacity of the queue, in messages. Further messages are dropped, so that logging never blocks.
@@ -57,12 +59,15 @@ pub(super) fn publisher(
 }
 
 /// Publishes log records until the log is closed.
-pub(super) async fn publish(publisher: Publisher<Log>, mut records: mpsc::Receiver<LogRecord>) {
+pub(super) async fn publish(
+    (writers, tap): (Arc<TopicWriters<Log>>, Tap<Log>),
+    mut records: mpsc::Receiver<LogRecord>,
+) {
     while let Some(record) = records.recv().await {
         let message = message(record);
-        publisher.tap.record(&message).await;
+        tap.record(&message).await;
         // A failure is not logged: the log record would fail in turn.
-        let _ = publisher.network.async_publish(message).await;
+        let _ = writers.write(message).await;
     }
 }
 

@@ -8,10 +8,10 @@ use std::io;
 use std::net::{Ipv4Addr, SocketAddr, ToSocketAddrs, UdpSocket};
 use std::thread;
 
-use rustdds::{DomainParticipant, RTPSEntity};
 use tracing::warn;
 
 use super::dispose::discovery_port;
+use super::own_participants::OwnParticipants;
 
 /// Number of participants of this host to which RustDDS 0.15 sends its announcement.
 const ANNOUNCED_PARTICIPANTS: u16 = 12;
@@ -20,15 +20,15 @@ const PARTICIPANTS_OF_PEER: u16 = 32;
 /// Octets of the GUID prefix in the header of a message (RTPS 2.5, 9.4.4).
 const GUID_PREFIX: std::ops::Range<usize> = 8..20;
 
-/// Starts a thread that forwards the announcements of `participant` to `peers`, names or addresses of hosts, until the
-/// process ends. Errors are logged.
-pub(super) fn announce(participant: &DomainParticipant, peers: &[String]) {
+/// Starts a thread that forwards the announcements of the participants `own` in a domain to `peers`, names or addresses
+/// of hosts, until the process ends. Errors are logged.
+pub(super) fn announce(own: OwnParticipants, domain_id: u16) {
+    let peers = own.static_peers();
     if peers.is_empty() {
         return;
     }
-    let (own, domain_id, peers) = (participant.guid().to_bytes(), participant.domain_id(), peers.to_vec());
     let forward = move || {
-        if let Err(error) = forward(&own[..12], domain_id, &peers) {
+        if let Err(error) = forward(&own, domain_id, &peers) {
             warn!("this node is not announced to ROS_STATIC_PEERS ({}): {error}", peers.join(", "));
         }
     };
@@ -37,14 +37,14 @@ pub(super) fn announce(participant: &DomainParticipant, peers: &[String]) {
     }
 }
 
-fn forward(own: &[u8], domain_id: u16, peers: &[String]) -> io::Result<()> {
+fn forward(own: &OwnParticipants, domain_id: u16, peers: &[String]) -> io::Result<()> {
     let announcements = bind(domain_id)?;
     let out = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
     let mut buffer = vec![0; 1 << 16];
     loop {
         let (length, _) = announcements.recv_from(&mut buffer)?;
         let datagram = &buffer[..length];
-        if datagram.get(GUID_PREFIX) == Some(own) {
+        if datagram.get(GUID_PREFIX).is_some_and(|prefix| own.contains_prefix(prefix)) {
             for address in peers.iter().flat_map(|peer| addresses(peer, domain_id)) {
                 // The peer may be unreachable at present.
                 let _ = out.send_to(datagram, address);

@@ -3,10 +3,11 @@
 use futures::StreamExt;
 use futures::future::BoxFuture;
 use futures::stream::FuturesUnordered;
-use ros2_client::{Context, Node};
+use ros2_client::Node;
 use ros2_interfaces_jazzy_serde::std_srvs::srv::{TriggerRequest, TriggerResponse};
 
 use super::args::RosArgs;
+use super::renewable::EndpointContext;
 use super::response_limiter::ResponseLimiter;
 use super::service::{Service, ServiceError};
 use crate::interface::NodeService;
@@ -24,7 +25,7 @@ impl TriggerService {
     /// [`ServiceError`] if the service cannot be created.
     pub fn new(
         node: &mut Node,
-        context: &Context,
+        context: &EndpointContext,
         args: &RosArgs,
         service: &NodeService,
     ) -> Result<Self, ServiceError> {

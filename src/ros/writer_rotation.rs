@@ -14,16 +14,16 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use ros2_client::{Context, Node};
-use rustdds::{DomainParticipant, Topic, TopicDescription};
-use serde::Serialize;
+use tokio::time::MissedTickBehavior;
 use tracing::warn;
 
 use super::announced_writers::dispose_sequence_number;
 use super::dispose::DisposeMessage;
 use super::environment::DiscoveryRange;
 use super::remote_participants::RemoteParticipants;
-use super::rtps::{Guid, is_secured};
-use super::stalled_readers::StalledReaders;
+use super::renewal::Renewal;
+use super::rtps::is_secured;
+use super::topic_writers::RotatedTopic;
 
 /// Number of samples after which a writer is replaced: 52 minutes at the default rate.
 const MAX_SAMPLES: i64 = 1 << 19;
@@ -33,35 +33,6 @@ const DISCOVERY_TIME: Duration = Duration::from_secs(5);
 const RETENTION_TIME: Duration = Duration::from_secs(30);
 /// Period at which the sample counts are checked.
 const POLL_PERIOD: Duration = Duration::from_secs(1);
-
-/// DataWriter of a topic, with the handling of its stalled readers.
-pub(super) struct Writer<M: Serialize> {
-    network: ros2_client::Publisher<M>,
-    /// Sample count, and GAP for readers that do not acknowledge.
-    pub(super) readers: StalledReaders,
-}
-
-impl<M: Serialize> Writer<M> {
-    /// Creates a writer of `topic`; `max_unacknowledged` is the number of unacknowledged samples at which it blocks.
-    pub(super) fn new(
-        network: ros2_client::Publisher<M>,
-        topic: &Topic,
-        max_unacknowledged: usize,
-        participant: &DomainParticipant,
-    ) -> Self {
-        let readers =
-            StalledReaders::new(network.guid(), topic.name(), max_unacknowledged, participant.clone());
-        Writer { network, readers }
-    }
-
-    /// Writes a message as soon as the middleware has space for it.
-    pub(super) async fn write(&self, message: M) {
-        match self.network.async_publish(message).await {
-            Ok(()) => self.readers.record_write(),
-            Err(_) => warn!("a message could not be published"),
-        }
-    }
-}
 
 /// Current writer of a topic and, during a rotation, the next or the previous one.
 #[derive(Debug)]
@@ -103,18 +74,24 @@ impl<W> WriterRotation<W> {
         Arc::clone(&generations.current)
     }
 
+    /// Replaces the current writer at once. Returns it.
+    pub(super) fn replace(&self, next: Arc<W>) -> Arc<W> {
+        std::mem::replace(&mut self.lock().current, next)
+    }
+
     /// Returns true if no rotation is in progress.
-    fn is_single(&self) -> bool {
+    pub(super) fn is_single(&self) -> bool {
         let generations = self.lock();
         generations.next.is_none() && generations.previous.is_none()
     }
 
-    fn prepare(&self, next: W, now: Instant) {
+    /// Adds the next writer, created at `now`.
+    pub(super) fn prepare(&self, next: W, now: Instant) {
         self.lock().next = Some((Arc::new(next), now));
     }
 
     /// Takes out the previous writer when [`RETENTION_TIME`] has passed.
-    fn take_retired(&self, now: Instant) -> Option<Arc<W>> {
+    pub(super) fn take_retired(&self, now: Instant) -> Option<Arc<W>> {
         let retired = self.lock().previous.take_if(|(_, since)| now.duration_since(*since) >= RETENTION_TIME);
         retired.map(|(writer, _)| writer)
     }
@@ -128,12 +105,12 @@ impl<W> Generations<W> {
     }
 }
 
-/// Topics whose writers are rotated.
+/// Topics of the node, whose writers are rotated if they are volatile.
 #[derive(Default)]
-pub struct RotatedTopics(Vec<Box<dyn RotatedTopic>>);
+pub struct RotatedTopics(Vec<Arc<dyn RotatedTopic>>);
 
 /// Node that owns the rotated writers.
-pub struct RotationContext {
+pub(super) struct RotationContext {
     /// Node of the writers.
     pub node: Node,
     /// ROS context of the node.
@@ -142,99 +119,73 @@ pub struct RotationContext {
     pub range: DiscoveryRange,
     /// Other participants.
     pub participants: RemoteParticipants,
+    /// Number of writers disposed of so far.
+    pub disposed: usize,
 }
 
 /// Number of writers that ros2-client does not list: the response writers of `send_goal` and `get_result`
 /// (`Service::for_action`).
 const WRITERS_OUTSIDE_NODES: usize = 2;
 
-/// Rotated topic of any message type.
-trait RotatedTopic: Send {
-    /// Creates the next writer if the current one has written at least `min_samples`. Returns true if it does.
-    fn prepare_next(&self, node: &mut Node, min_samples: i64, now: Instant) -> Result<bool, String>;
-    /// Drops the previous writer when its retention time has passed, after a call of `dispose` with its GUID.
-    fn retire(&self, now: Instant, dispose: &mut dyn FnMut(Guid));
-    /// Returns the name of the topic in DDS.
-    fn name(&self) -> String;
-}
-
-struct TypedTopic<M: Serialize> {
-    writers: Arc<WriterRotation<Writer<M>>>,
-    topic: Topic,
-    max_unacknowledged: usize,
-    participant: DomainParticipant,
-}
-
-impl<M: Serialize + Send + Sync + 'static> RotatedTopic for TypedTopic<M> {
-    fn prepare_next(&self, node: &mut Node, min_samples: i64, now: Instant) -> Result<bool, String> {
-        let is_due = self.writers.is_single() && self.writers.current().readers.written() >= min_samples;
-        if is_due {
-            let network = node.create_publisher(&self.topic, None).map_err(|e| e.to_string())?;
-            let writer = Writer::new(network, &self.topic, self.max_unacknowledged, &self.participant);
-            self.writers.prepare(writer, now);
-        }
-        Ok(is_due)
-    }
-
-    fn retire(&self, now: Instant, dispose: &mut dyn FnMut(Guid)) {
-        if let Some(retired) = self.writers.take_retired(now) {
-            dispose(retired.network.guid().to_bytes());
-        }
-    }
-
-    fn name(&self) -> String {
-        self.topic.name()
-    }
-}
-
 impl RotatedTopics {
-    /// Adds a topic with its current writer.
-    pub(super) fn add<M: Serialize + Send + Sync + 'static>(
-        &mut self,
-        writers: Arc<WriterRotation<Writer<M>>>,
-        topic: Topic,
-        max_unacknowledged: usize,
-        participant: DomainParticipant,
-    ) {
-        self.0.push(Box::new(TypedTopic { writers, topic, max_unacknowledged, participant }));
+    /// Adds a topic with its writers.
+    pub(super) fn add(&mut self, writers: Arc<dyn RotatedTopic>) {
+        self.0.push(writers);
     }
 
-    /// Rotates the writers until the task is aborted.
-    pub async fn run(self, mut owner: RotationContext) {
+    /// Rotates the writers, and renews the participant when it is due, until the task is aborted.
+    pub(super) async fn run(self, mut owner: RotationContext, mut renewal: Renewal) {
         let mut timer = tokio::time::interval(POLL_PERIOD);
-        let mut disposed = 0;
+        timer.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut returned = HashSet::new();
         loop {
             timer.tick().await;
             let now = Instant::now();
-            for topic in &self.0 {
-                topic.retire(now, &mut |writer| {
-                    if !is_secured() {
-                        let participant = owner.context.domain_participant();
-                        let number = dispose_sequence_number(&owner.context, WRITERS_OUTSIDE_NODES, disposed);
-                        DisposeMessage::for_writer(&writer, number, &participant, owner.range).send_once();
-                    }
-                    disposed += 1;
-                });
+            self.retire(&mut owner, now);
+            self.prepare_next(&mut owner, &mut returned, now);
+            let is_single = self.0.iter().all(|topic| topic.is_single());
+            if renewal.is_due(now) && is_single {
+                renewal.run(&self.0, &mut owner).await;
             }
-            let is_settled = owner.participants.is_settled(now);
-            if is_settled {
-                returned.extend(owner.topics_of_returned());
-            }
-            for topic in &self.0 {
-                let name = topic.name();
-                let min_samples = if returned.contains(&name) { 0 } else { min_samples(is_settled) };
-                match topic.prepare_next(&mut owner.node, min_samples, now) {
-                    Ok(true) => drop(returned.remove(&name)),
-                    Ok(false) => {}
-                    Err(reason) => {
-                        warn!("cannot create a new writer for {}: {reason}", name.trim_start_matches("rt"));
-                    }
+        }
+    }
+
+    /// Drops the previous writers whose retention time has passed.
+    fn retire(&self, owner: &mut RotationContext, now: Instant) {
+        for topic in &self.0 {
+            topic.retire(now, &mut |writer| {
+                if !is_secured() {
+                    let participant = owner.context.domain_participant();
+                    let number =
+                        dispose_sequence_number(&owner.context, WRITERS_OUTSIDE_NODES, owner.disposed);
+                    DisposeMessage::for_writer(&writer, number, &participant, owner.range).send_once();
+                }
+                owner.disposed += 1;
+            });
+        }
+    }
+
+    /// Creates the next writers of the topics that are due, or are in `returned`, the topics (names in DDS) of
+    /// participants that have returned.
+    fn prepare_next(&self, owner: &mut RotationContext, returned: &mut HashSet<String>, now: Instant) {
+        let is_settled = owner.participants.is_settled(now);
+        if is_settled {
+            returned.extend(owner.topics_of_returned());
+        }
+        let rotating = || self.0.iter().filter(|topic| topic.is_rotating());
+        for topic in rotating() {
+            let name = topic.name();
+            let min_samples = if returned.contains(&name) { 0 } else { min_samples(is_settled) };
+            match topic.prepare_next(&mut owner.node, min_samples, now) {
+                Ok(true) => drop(returned.remove(&name)),
+                Ok(false) => {}
+                Err(reason) => {
+                    warn!("cannot create a new writer for {}: {reason}", name.trim_start_matches("rt"));
                 }
             }
-            // Only a rotation in progress delays the next one.
-            returned.retain(|name| self.0.iter().any(|topic| topic.name() == *name));
         }
+        // Only a rotation in progress delays the next one.
+        returned.retain(|name| rotating().any(|topic| topic.name() == *name));
     }
 }
 

@@ -9,7 +9,7 @@ use futures::future::BoxFuture;
 use futures::stream::{FuturesUnordered, select_all};
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
 use ros2_client::service::RmwRequestId;
-use ros2_client::{Context, MessageTypeName, Node, ServiceTypeName};
+use ros2_client::{MessageTypeName, Node, ServiceTypeName};
 use rustdds::TopicKind;
 use tokio::sync::{mpsc, oneshot, watch};
 use tracing::{info, warn};
@@ -28,6 +28,7 @@ use crate::ros::goal_event::{GoalEvent, goal_name};
 use crate::ros::health::Health;
 use crate::ros::inputs::next_motion_id;
 use crate::ros::outputs::Output;
+use crate::ros::renewable::EndpointContext;
 use crate::ros::response_limiter::{ResponseLimiter, ResponsePermit};
 use crate::ros::results::{Origin, TrajectoryResults};
 use crate::ros::service::{Service, ServiceError};
@@ -70,7 +71,7 @@ impl ActionServer {
     /// [`ServiceError`] if the name cannot be resolved or the middleware cannot create a service or topic.
     pub fn new(
         node: &mut Node,
-        context: &Context,
+        context: &EndpointContext,
         args: &RosArgs,
     ) -> Result<(Self, ActionTopics), ServiceError> {
         let name = args.resolve_service(FOLLOW_JOINT_TRAJECTORY.name).map_err(|e| failure(e.to_string()))?;
@@ -79,7 +80,7 @@ impl ActionServer {
         Ok((server, topics))
     }
 
-    fn create_services(node: &mut Node, context: &Context, name: &str) -> Result<Self, ServiceError> {
+    fn create_services(node: &mut Node, context: &EndpointContext, name: &str) -> Result<Self, ServiceError> {
         let send_goal = Service::for_action(
             node,
             context,
@@ -162,7 +163,7 @@ fn failure(reason: String) -> ServiceError {
 }
 
 impl ActionTopics {
-    fn new(node: &mut Node, context: &Context, name: String) -> Result<Self, ServiceError> {
+    fn new(node: &mut Node, context: &EndpointContext, name: String) -> Result<Self, ServiceError> {
         let qos = |durability: Durability, depth: usize| QosProfile {
             reliability: Reliability::Reliable { when_full: WhenFull::Block },
             durability,

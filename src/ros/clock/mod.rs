@@ -16,7 +16,7 @@ use futures::StreamExt;
 use ros2_client::MessageInfo;
 use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::Time;
 use ros2_interfaces_jazzy_serde::rosgraph_msgs::msg::Clock;
-use rustdds::{DomainParticipant, RTPSEntity};
+use rustdds::RTPSEntity;
 use tokio::sync::watch;
 use tracing::{info, warn};
 
@@ -24,6 +24,7 @@ use super::convert::stamp;
 use super::endpoints::Subscription;
 use super::health::Health;
 use super::outputs::Output;
+use super::own_participants::OwnParticipants;
 use election::{Election, GuidPrefix, RemoteClock};
 use follower::ClockFollower;
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
@@ -91,8 +92,8 @@ pub struct ClockInput {
     pub subscription: Subscription<Clock>,
     /// Resolved name of the topic.
     pub name: String,
-    /// Participant, which discovers the publishers.
-    pub participant: DomainParticipant,
+    /// Participants of this process, of which the current one discovers the publishers.
+    pub participants: OwnParticipants,
     /// Position cycle Tsp, ns.
     pub period: Nanoseconds,
     /// State of the axes' thread, with the time of the last position cycle.
@@ -104,11 +105,13 @@ pub struct ClockInput {
 impl ClockInput {
     /// Follows the clock until the node shuts down; takes part in the election if `is_fast`.
     pub async fn run(self, is_fast: bool) {
-        let own = prefix_of(&self.participant.guid().to_bytes());
+        // The participant is not renewed in `fast`, where it takes part in the election.
+        let own =
+            self.participants.current().map(|dds| prefix_of(&dds.guid().to_bytes())).unwrap_or_default();
         let election = is_fast.then(|| Election::new(own));
         let follower = ClockFollower::new(self.period);
-        let ClockInput { subscription, name, participant, health, state, .. } = self;
-        let graph = ClockGraph { participant, topic: format!("rt{name}"), own };
+        let ClockInput { subscription, name, participants, health, state, .. } = self;
+        let graph = ClockGraph { participants, topic: format!("rt{name}"), own };
         let machines = HashSet::new();
         let mut watcher = ClockWatcher {
             name,
@@ -150,7 +153,7 @@ fn prefix_of(guid: &[u8; 16]) -> GuidPrefix {
 
 /// Discovered publishers of the clock.
 struct ClockGraph {
-    participant: DomainParticipant,
+    participants: OwnParticipants,
     topic: String,
     own: GuidPrefix,
 }
@@ -159,8 +162,10 @@ impl ClockGraph {
     /// Returns the other participants that have a publisher of the clock.
     fn remote_clocks(&self) -> Vec<RemoteClock> {
         let writers: Vec<(String, String, GuidPrefix)> = self
-            .participant
-            .discovered_writers()
+            .participants
+            .current()
+            .map(|participant| participant.discovered_writers())
+            .unwrap_or_default()
             .into_iter()
             .map(|writer| {
                 let prefix = prefix_of(&writer.writer_proxy.remote_writer_guid.to_bytes());

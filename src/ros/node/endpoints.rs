@@ -1,8 +1,7 @@
 //! Creation of the ROS node with its topics, services and action.
 
-use ros2_client::{Context, Node, NodeName, NodeOptions};
+use ros2_client::Node;
 use ros2_interfaces_jazzy_serde::rcl_interfaces::msg::Log;
-use rustdds::DomainParticipant;
 
 use super::NodeError;
 use super::setup::NodeSetup;
@@ -11,7 +10,9 @@ use crate::ros::action::{ActionServer, ActionTopics};
 use crate::ros::args::RosArgs;
 use crate::ros::endpoints::{Endpoints, Publisher};
 use crate::ros::parameter_services::ParameterServices;
+use crate::ros::participant::create_node;
 use crate::ros::recorder::TopicRecorder;
+use crate::ros::renewable::EndpointContext;
 use crate::ros::rosout;
 use crate::ros::tool::ToolTopics;
 use crate::ros::topics::Topics;
@@ -45,16 +46,16 @@ impl NodeEndpoints {
     /// # Errors
     /// [`NodeError`] naming the node, topic or service that cannot be created.
     pub(super) fn create(
-        context: &Context,
-        participant: &DomainParticipant,
+        context: &EndpointContext,
         args: &RosArgs,
         parameters: &Parameters,
         setup: &NodeSetup,
         recorder: &mut TopicRecorder,
     ) -> Result<Self, NodeError> {
-        let mut node = create_node(context, args)?;
-        let rosout = rosout::publisher(&mut node, participant, args, recorder)?;
-        let mut endpoints = Endpoints::new(&mut node, participant, args, parameters, recorder);
+        let mut node = create_node(context, args)
+            .map_err(|reason| NodeError::Node { name: args.node().to_string(), reason })?;
+        let rosout = rosout::publisher(&mut node, &context.domain_participant(), args, recorder)?;
+        let mut endpoints = Endpoints::new(&mut node, context, args, parameters, recorder);
         let mut topics = Topics::create(&mut endpoints, args, setup.mode)?;
         let tool = ToolTopics::create(&mut endpoints, Kinematics::new(&setup.config))?;
         topics.names.add_published(tool.as_ref().map_or(&[], |tool| &tool.names));
@@ -68,12 +69,4 @@ impl NodeEndpoints {
         let services = NodeServices { reset, stop, feed_hold, cycle_start, parameters };
         Ok(NodeEndpoints { node, rosout, topics, tool, action, action_topics, services })
     }
-}
-
-fn create_node(context: &Context, args: &RosArgs) -> Result<Node, NodeError> {
-    let failed = |reason: String| NodeError::Node { name: args.node().to_string(), reason };
-    let name =
-        NodeName::new(args.node().namespace(), args.node().name()).map_err(|e| failed(format!("{e:?}")))?;
-    let options = NodeOptions::new().start_parameter_services(false).enable_rosout(false);
-    context.new_node(name, options).map_err(|e| failed(e.to_string()))
 }

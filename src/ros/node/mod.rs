@@ -25,15 +25,15 @@ use super::discovery_gate::ClosedGate;
 use super::environment::Environment;
 use super::health::Health;
 use super::log::LogRecord;
+use super::own_participants::OwnParticipants;
 use super::parameter_host::LiveNodeParameters;
 use super::participant::Participant;
 use super::recorder::{TopicRecorder, TopicRecording};
-use super::remote_participants::RemoteParticipants;
+use super::renewable::EndpointContext;
 use super::security::Security;
 use super::service;
 use super::static_peers;
 use super::topics::Topics;
-use super::writer_rotation::RotationContext;
 use crate::interface::SERVICES;
 use endpoints::NodeEndpoints;
 use outputs::{NodeOutputs, NodePublishers, start_outputs};
@@ -61,11 +61,11 @@ pub fn run(
         .build()
         .map_err(|source| NodeError::System { what: "start the runtime", source })?;
     let gate = ClosedGate::new();
-    let participant = Participant::open_with(environment, security)?;
-    let result = runtime.block_on(serve(args, &participant, gate, parameters, log));
+    let participants = OwnParticipants::new(Participant::open_with(environment, security)?);
+    let result = runtime.block_on(serve(args, &participants, gate, parameters, log));
     // Tasks and endpoints have ended; remaining blocking threads are not waited for.
     runtime.shutdown_timeout(Duration::from_millis(50));
-    participant.shutdown();
+    participants.shutdown();
     result
 }
 
@@ -73,7 +73,7 @@ pub fn run(
 /// when `gate` opens.
 async fn serve(
     args: &RosArgs,
-    participant: &Participant,
+    participants: &OwnParticipants,
     gate: ClosedGate,
     parameters: Parameters,
     log: mpsc::Receiver<LogRecord>,
@@ -83,9 +83,8 @@ async fn serve(
     let setup = NodeSetup::new(&parameters)?;
     let (health_out, health) = watch::channel(Health::default());
     let mut recorder = TopicRecorder::open(&setup.node_config, setup.overflow, &health)?;
-    let context = participant.context()?;
-    let dds = context.domain_participant();
-    let endpoints = NodeEndpoints::create(&context, &dds, args, &parameters, &setup, &mut recorder)?;
+    let context = EndpointContext::new(participants.context()?);
+    let endpoints = NodeEndpoints::create(&context, args, &parameters, &setup, &mut recorder)?;
     let NodeEndpoints { node, rosout, topics, tool, action, action_topics, services } = endpoints;
     let Topics { subscriptions, publishers: topics, names } = topics;
 
@@ -94,17 +93,23 @@ async fn serve(
     let dropped = Arc::new(AtomicU64::new(0));
     let mut tasks = JoinSet::new();
     let publishers = NodePublishers {
+        rosout,
         topics,
         tool,
         action_status: action_topics.status,
         action_feedback: action_topics.feedback,
     };
+    let dds = context.domain_participant();
     let outputs = start_outputs(publishers, &dds, &setup, &clock, &dropped, &mut tasks);
-    let NodeOutputs { fan_out, results, diagnostics, action: action_outputs, tracker, rotated } = outputs;
+    static_peers::announce(participants.clone(), dds.domain_id());
+    // A renewal drops this participant.
+    drop(dds);
+    let NodeOutputs { rosout, fan_out, results, diagnostics, action: action_outputs, tracker, rotated } =
+        outputs;
     let mut tasks = NodeTasks {
         args,
         setup: &setup,
-        participant: dds.clone(),
+        participants: participants.clone(),
         commands,
         health,
         results,
@@ -113,11 +118,8 @@ async fn serve(
         tasks,
     };
     tasks.spawn_log_output(rosout, log);
-    static_peers::announce(&dds, participant.static_peers());
     let recording = recorder.start()?;
-    let (range, participants) = (participant.range(), RemoteParticipants::default());
-    let rotation = RotationContext { node, context: context.clone(), range, participants };
-    let discovered = tasks.spawn_discovery(tracker, rotated, rotation);
+    let discovered = tasks.spawn_discovery(tracker, rotated, node, context);
     tasks.spawn_clock_input(subscriptions.clock, clock_out);
     let action = tasks.spawn_trajectory_inputs(action, action_outputs, subscriptions.psec);
     let inputs = tasks.stream_and_load_inputs(subscriptions.psec_stream, subscriptions.load);
@@ -134,7 +136,5 @@ async fn serve(
     signals.wait().await;
     let NodeTasks { commands, tasks, .. } = tasks;
     ShutdownSequence { action, commands, tasks, thread_ended, recording }.run().await;
-    drop(dds);
-    drop(context);
     Ok(())
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::DiagnosticArray;
+use ros2_interfaces_jazzy_serde::rcl_interfaces::msg::Log;
 use rustdds::DomainParticipant;
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
@@ -17,8 +18,10 @@ use crate::ros::goal_event::GoalEvent;
 use crate::ros::matched_subscriptions::MatchedSubscriptionTracker;
 use crate::ros::outputs::{Output, OutputFactory};
 use crate::ros::overflow::OverflowPolicy;
+use crate::ros::recorder::Tap;
 use crate::ros::results::TrajectoryResults;
 use crate::ros::tool::ToolTopics;
+use crate::ros::topic_writers::TopicWriters;
 use crate::ros::topics::TopicPublishers;
 use crate::ros::writer_rotation::RotatedTopics;
 use virtual_axes_core::units::seconds;
@@ -27,6 +30,7 @@ use virtual_axes_io::messages::action_msgs::msg::GoalStatusArray;
 
 /// Publishers whose outputs are started.
 pub(super) struct NodePublishers {
+    pub(super) rosout: Option<Publisher<Log>>,
     pub(super) topics: TopicPublishers,
     pub(super) tool: Option<ToolTopics>,
     pub(super) action_status: Publisher<GoalStatusArray>,
@@ -35,6 +39,8 @@ pub(super) struct NodePublishers {
 
 /// Outputs of the node, with what their background tasks need.
 pub(super) struct NodeOutputs {
+    /// Writers and tap of `/rosout`, if it is enabled.
+    pub(super) rosout: Option<(Arc<TopicWriters<Log>>, Tap<Log>)>,
     pub(super) fan_out: FanOut,
     pub(super) results: Arc<TrajectoryResults>,
     pub(super) diagnostics: Output<DiagnosticArray>,
@@ -59,12 +65,13 @@ pub(super) fn start_outputs(
     dropped: &Arc<AtomicU64>,
     tasks: &mut JoinSet<()>,
 ) -> NodeOutputs {
-    let NodePublishers { topics, tool, action_status, action_feedback } = publishers;
+    let NodePublishers { rosout, topics, tool, action_status, action_feedback } = publishers;
     let NodeSetup { node_config, overflow, result_overflow, .. } = setup;
     let mut tracker = MatchedSubscriptionTracker::default();
     let mut rotated = RotatedTopics::default();
     let (tracker_in, rotated_in) = (&mut tracker, &mut rotated);
     let mut factory = OutputFactory { participant, dropped, tracker: tracker_in, tasks, rotated: rotated_in };
+    let rosout = rosout.map(|publisher| factory.writers(publisher));
     let (goal_events, events) = mpsc::unbounded_channel();
     let results = TrajectoryResults::new(
         factory.start(topics.results, *result_overflow),
@@ -95,7 +102,7 @@ pub(super) fn start_outputs(
         every: publication_period(setup),
     };
     let action = ActionOutputs { status, running, events };
-    NodeOutputs { fan_out, results: Arc::new(results), diagnostics, action, tracker, rotated }
+    NodeOutputs { rosout, fan_out, results: Arc::new(results), diagnostics, action, tracker, rotated }
 }
 
 /// Returns the number of position cycles between publications, at least 1.

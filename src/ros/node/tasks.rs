@@ -6,12 +6,12 @@ use std::sync::atomic::AtomicU64;
 use futures::future::{BoxFuture, join, pending};
 use futures::stream::FuturesUnordered;
 use futures::{FutureExt, StreamExt};
+use ros2_client::Node;
 use ros2_interfaces_jazzy_serde::diagnostic_msgs::msg::DiagnosticArray;
 use ros2_interfaces_jazzy_serde::rcl_interfaces::msg::Log;
 use ros2_interfaces_jazzy_serde::rosgraph_msgs::msg::Clock;
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
-use rustdds::DomainParticipant;
 use tokio::runtime::Handle;
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
@@ -25,7 +25,7 @@ use crate::ros::args::RosArgs;
 use crate::ros::axes_interface::{Command, SimulationReport};
 use crate::ros::clock::{ClockInput, ClockState};
 use crate::ros::diagnostics::Diagnostics;
-use crate::ros::endpoints::{Publisher, Subscription};
+use crate::ros::endpoints::Subscription;
 use crate::ros::fan_out::publish_diagnostics;
 use crate::ros::health::Health;
 use crate::ros::inputs::{
@@ -34,13 +34,18 @@ use crate::ros::inputs::{
 use crate::ros::log::LogRecord;
 use crate::ros::matched_subscriptions::MatchedSubscriptionTracker;
 use crate::ros::outputs::Output;
+use crate::ros::own_participants::OwnParticipants;
 use crate::ros::pace::{CooperativeTasks, Pace};
 use crate::ros::parameter_host::{LiveNodeParameters, NodeParameterHost};
-use crate::ros::recorder::RecordingStatus;
+use crate::ros::recorder::{RecordingStatus, Tap};
 use crate::ros::remote_endpoints::DiscoveredEndpoints;
+use crate::ros::renewable::EndpointContext;
+use crate::ros::renewal::{Renewal, RenewalSettings};
 use crate::ros::results::TrajectoryResults;
+use crate::ros::rtps::is_secured;
+use crate::ros::topic_writers::TopicWriters;
 use crate::ros::writer_rotation::{RotatedTopics, RotationContext};
-use crate::ros::{convert, duplicate_node_name, matched_subscriptions, rosout};
+use crate::ros::{convert, rosout};
 use virtual_axes_core::config::{Parameters, TimeMode};
 use virtual_axes_io::messages::SpeedScalingFactor;
 
@@ -48,7 +53,7 @@ use virtual_axes_io::messages::SpeedScalingFactor;
 pub(super) struct NodeTasks<'a> {
     pub(super) args: &'a RosArgs,
     pub(super) setup: &'a NodeSetup,
-    pub(super) participant: DomainParticipant,
+    pub(super) participants: OwnParticipants,
     pub(super) commands: mpsc::Sender<Command>,
     pub(super) health: watch::Receiver<Health>,
     pub(super) results: Arc<TrajectoryResults>,
@@ -59,31 +64,40 @@ pub(super) struct NodeTasks<'a> {
 }
 
 impl NodeTasks<'_> {
-    /// Starts the output `/rosout`, if it is enabled, and the check for duplicate node names.
+    /// Starts the output `/rosout`, if it is enabled.
     pub(super) fn spawn_log_output(
         &mut self,
-        rosout: Option<Publisher<Log>>,
+        rosout: Option<(Arc<TopicWriters<Log>>, Tap<Log>)>,
         log: mpsc::Receiver<LogRecord>,
     ) {
-        if let Some(publisher) = rosout {
-            self.tasks.spawn(rosout::publish(publisher, log));
+        if let Some(output) = rosout {
+            self.tasks.spawn(rosout::publish(output, log));
         }
-        self.tasks.spawn(duplicate_node_name::watch(&self.participant, self.args.node().clone()));
     }
 
-    /// Starts the tracking of matched subscriptions and the rotation of writers. Returns the count of discovered
-    /// endpoints.
+    /// Starts the handling of discovery, the rotation of writers and the renewal of the participant. Returns the count
+    /// of discovered endpoints.
     pub(super) fn spawn_discovery(
         &mut self,
         tracker: MatchedSubscriptionTracker,
         rotated: RotatedTopics,
-        rotation: RotationContext,
+        node: Node,
+        context: EndpointContext,
     ) -> DiscoveredEndpoints {
         let discovered = DiscoveredEndpoints::default();
-        let participants = rotation.participants.clone();
-        let participant = self.participant.clone();
-        self.tasks.spawn(matched_subscriptions::run(participant, tracker, discovered.clone(), participants));
-        self.tasks.spawn(rotated.run(rotation));
+        let is_renewable = self.setup.mode != TimeMode::Fast && !is_secured();
+        let settings = RenewalSettings {
+            threshold: self.setup.node_config.renewal_endpoints.filter(|_| is_renewable),
+            own: self.participants.clone(),
+            args: self.args.clone(),
+            health: self.health.clone(),
+            discovered: discovered.clone(),
+        };
+        let (context, endpoints) = context.into_parts();
+        let renewal = Renewal::new(settings, context.domain_participant(), tracker, endpoints);
+        let (range, participants) = (self.participants.range(), renewal.participants());
+        let owner = RotationContext { node, context, range, participants, disposed: 0 };
+        self.tasks.spawn(rotated.run(owner, renewal));
         discovered
     }
 
@@ -94,9 +108,9 @@ impl NodeTasks<'_> {
         state: watch::Sender<ClockState>,
     ) {
         let Some((subscription, name)) = input else { return };
-        let (participant, health) = (self.participant.clone(), self.health.clone());
+        let (participants, health) = (self.participants.clone(), self.health.clone());
         let period = self.setup.period;
-        let input = ClockInput { subscription, name, participant, period, health, state };
+        let input = ClockInput { subscription, name, participants, period, health, state };
         self.tasks.spawn(input.run(self.setup.mode == TimeMode::Fast));
     }
 

@@ -5,6 +5,7 @@
 //! without the spinner.
 
 use std::future::Future;
+use std::sync::Arc;
 
 use futures::{
     StreamExt,
@@ -26,6 +27,7 @@ use ros2_interfaces_jazzy_serde::{
 };
 
 use super::args::RosArgs;
+use super::renewable::{EndpointContext, Renewable};
 use super::response_limiter::{ResponseLimiter, ResponsePermit};
 use super::service::{Service, ServiceError, profile};
 use crate::ingress::parameters::{self as wire, ParameterHost, list_parameters};
@@ -51,7 +53,7 @@ pub struct ParameterServices {
     set_atomically: Service<SetParametersAtomicallyRequest, SetParametersAtomicallyResponse>,
     list: Service<ListParametersRequest, ListParametersResponse>,
     describe: Service<DescribeParametersRequest, DescribeParametersResponse>,
-    events: Publisher<msg::ParameterEvent>,
+    events: Arc<Renewable<Publisher<msg::ParameterEvent>>>,
     node_name: String,
 }
 
@@ -60,7 +62,7 @@ impl ParameterServices {
     ///
     /// # Errors
     /// `ServiceError` naming the first that cannot be created.
-    pub fn new(node: &mut Node, context: &Context, args: &RosArgs) -> Result<Self, ServiceError> {
+    pub fn new(node: &mut Node, context: &EndpointContext, args: &RosArgs) -> Result<Self, ServiceError> {
         let mut factory = ParameterServiceFactory { node, context, args };
         Ok(Self {
             get: factory.service(&interface::GET_PARAMETERS)?,
@@ -188,7 +190,7 @@ impl ParameterServices {
             changed_parameters: changed_parameters.collect(),
             ..Default::default()
         };
-        if let Err(error) = self.events.async_publish(event).await {
+        if let Err(error) = self.events.current().async_publish(event).await {
             tracing::warn!("parameter event not published: {error:?}");
         }
         Ok(())
@@ -217,29 +219,30 @@ fn list_limited(names: &[String], prefixes: &[String], depth: u64) -> msg::ListP
 /// Factory of the services, reliable and with rmw's depth.
 struct ParameterServiceFactory<'a> {
     node: &'a mut Node,
-    context: &'a Context,
+    context: &'a EndpointContext,
     args: &'a RosArgs,
 }
 
 impl ParameterServiceFactory<'_> {
-    fn service<Q: Message + Clone + 'static, A: Message + 'static>(
-        &mut self,
-        service: &NodeService,
-    ) -> Result<Service<Q, A>, ServiceError> {
+    fn service<Q, A>(&mut self, service: &NodeService) -> Result<Service<Q, A>, ServiceError>
+    where
+        Q: Message + Clone + Send + Sync + 'static,
+        A: Message + Send + Sync + 'static,
+    {
         Service::new(self.node, self.context, self.args, service, QUEUE_DEPTH)
     }
 
-    fn events(&mut self) -> Result<Publisher<msg::ParameterEvent>, ServiceError> {
+    fn events(&mut self) -> Result<Arc<Renewable<Publisher<msg::ParameterEvent>>>, ServiceError> {
         let Topic { name, package, message, .. } = interface::PARAMETER_EVENTS;
         let error = |reason: String| ServiceError { name: name.to_owned(), reason };
         let resolved = self.args.resolve_topic(name).map_err(|e| error(e.to_string()))?;
         let name = Name::parse(&resolved).map_err(|e| error(e.to_string()))?;
-        let type_name = MessageTypeName::new(package, message);
-        let topic = self
-            .node
-            .create_topic(&name, type_name, &profile(PARAMETER_EVENTS_QOS.depth))
-            .map_err(|e| error(e.to_string()))?;
-        self.node.create_publisher(&topic, None).map_err(|e| error(e.to_string()))
+        let create = move |node: &mut Node, _: &Context| {
+            let type_name = MessageTypeName::new(package, message);
+            let topic = node.create_topic(&name, type_name, &profile(PARAMETER_EVENTS_QOS.depth));
+            topic.and_then(|topic| node.create_publisher(&topic, None)).map_err(|e| e.to_string())
+        };
+        Renewable::create(self.node, self.context, create).map_err(error)
     }
 }
 

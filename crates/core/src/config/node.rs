@@ -55,6 +55,8 @@ pub struct NodeConfig {
     pub record: Option<PathBuf>,
     /// Maximum size of the recording, bytes.
     pub record_max: u64,
+    /// Number of departed remote endpoints after which the DDS participant is renewed; `None` disables it.
+    pub renewal_endpoints: Option<u64>,
 }
 
 /// Default tolerances of action goals.
@@ -113,6 +115,10 @@ impl Parameters {
             Some(Value::Integer(size)) => u64::try_from(size).unwrap_or_default() * MEGABYTE,
             _ => u64::MAX,
         };
+        let renewal_endpoints = match self.get("renewal_endpoints") {
+            Some(Value::Integer(count)) => u64::try_from(count).ok().filter(|&count| count > 0),
+            _ => None,
+        };
         NodeConfig {
             time,
             publish_rate: (rate > 0.0).then_some(rate),
@@ -128,6 +134,7 @@ impl Parameters {
             },
             record: (!record.is_empty()).then(|| PathBuf::from(record)),
             record_max,
+            renewal_endpoints,
         }
     }
 

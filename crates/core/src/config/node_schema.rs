@@ -84,6 +84,10 @@ pub(super) const NODE: &[ParameterDefinition] = &[
         .of_node()
         .default(Integer(1024))
         .describe("Maximum size of the recording, which is closed there; the axes continue."),
+    ParameterDefinition::new("renewal_endpoints", "", ParameterKind::Integer { min: 0, max: 1_000_000_000 })
+        .of_node()
+        .default(Integer(100_000))
+        .describe("Number of departed remote endpoints after which the node renews its DDS participant at rest, which releases their memory; 0 disables it. Not in fast and not with DDS Security."),
     // Quality of service.
     qos_reliability("qos.psec.reliability", "reliable"),
     qos_durability("qos.psec.durability", "volatile"),

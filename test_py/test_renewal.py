@@ -1,0 +1,162 @@
+"""Renewal of the DDS participant: memory of departed endpoints is released, and no subscriber or client notices."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from action_msgs.msg import GoalStatus
+from control_msgs.action import FollowJointTrajectory
+from rcl_interfaces.msg import Log
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+from virtual_axes.msg import TrajectoryResult
+
+from action import Follow, goal, line
+from drive import TSP_NS, Drive, joint_trajectory
+from test_record import read, stamps
+
+DEPARTED = 60
+"""Number of departed endpoints of a renewal."""
+RENEWAL_S = 60
+"""Timeout of a renewal, s: rest, discovery and retention take 15 s."""
+GAIN = "x.velocity_loop.gain"
+STREAM_S = 8
+"""Duration of a stream, s, longer than the rest before a renewal."""
+MOVED = 0.02
+"""Position of X before the renewal, m."""
+
+
+def leave(drive: Drive) -> None:
+    """Creates subscriptions in another participant, which leaves when the node has discovered them."""
+    assert drive.process is not None
+
+    def count() -> int:
+        return int(drive.next_status()["endpoints_discovered"])
+
+    before = count()
+    with Drive(process=drive.process, listen=False) as other:
+        for number in range(DEPARTED):
+            create = other.node.create_subscription
+            other.in_executor(lambda: create(JointState, f"/departing_{number}", lambda _: None, 1))
+        drive.wait_for(lambda: count() >= before + DEPARTED, 30, "the endpoints that will depart")
+
+
+def writers(drive: Drive, topic: str = "/joint_states") -> set[bytes]:
+    """Returns the GIDs of a topic's publishers."""
+    return {bytes(info.endpoint_gid) for info in drive.node.get_publishers_info_by_topic(topic)}
+
+
+def endpoints(drive: Drive) -> Counter:
+    """Returns the endpoints of the node with their types and QoS."""
+    name, namespace = drive.target.lstrip("/"), "/"
+    found: Counter = Counter()
+    by_node = (
+        drive.node.get_publisher_names_and_types_by_node,
+        drive.node.get_subscriber_names_and_types_by_node,
+        drive.node.get_service_names_and_types_by_node,
+        drive.node.get_client_names_and_types_by_node,
+    )
+    for get in by_node:
+        found.update((get.__name__, topic, *types) for topic, types in get(name, namespace))
+    for topic, _ in drive.node.get_publisher_names_and_types_by_node(name, namespace):
+        for info in drive.node.get_publishers_info_by_topic(topic):
+            if info.node_name == name:
+                qos = info.qos_profile
+                found[(topic, str(qos.reliability), str(qos.durability))] += 1
+    return found
+
+
+def renew(drive: Drive, meanwhile: Callable[[], None]) -> None:
+    """Waits for the next renewal to end and calls `meanwhile` until then."""
+    first = writers(drive)
+    deadline = time.monotonic() + RENEWAL_S
+    has_overlapped = False
+    while not (has_overlapped and len(now := writers(drive)) == 1 and now != first):
+        has_overlapped = has_overlapped or len(writers(drive)) == 2
+        assert time.monotonic() < deadline, drive.process.output()
+        meanwhile()
+    drive.wait_for(lambda: "participant is renewed" in drive.process.output(), 20, "log message")
+
+
+def test_a_renewal_loses_nothing(start: Callable[..., Drive], tmp_path: Path):
+    path = tmp_path / "renewed.mcap"
+    drive = start("-p", f"renewal_endpoints:={DEPARTED}", "-p", f"record:={path}")
+    with Follow(drive) as follow:
+        drive.run(line(["x"], [MOVED], 1.0), settle=0.5)
+        gain = drive.get_parameters([GAIN])[GAIN]
+        drive.set_parameters({GAIN: 0.9 * gain})
+        begin, known, first = drive.now(), endpoints(drive), writers(drive)
+
+        # No renewal during a goal or a stream.
+        active = follow.send(goal(line(["y"], [0.01], 10.0)))
+        leave(drive)
+        ended = active.ask()
+        while not ended.done():
+            assert writers(drive) == first
+            time.sleep(0.05)
+        assert ended.result().status == GoalStatus.STATUS_SUCCEEDED
+        streams_until = time.monotonic() + STREAM_S
+        while time.monotonic() < streams_until:
+            drive.stream(["x"], [MOVED])
+            assert writers(drive) == first
+            time.sleep(0.02)
+
+        invalid = joint_trajectory(["q"], [0.0], [[0.0]])
+        sent: list[int] = []
+
+        def load_inputs() -> None:
+            """A rejected trajectory, a parameter request, and the node in the graph."""
+            sent.append(drive.send(invalid))
+            assert drive.get_parameters([GAIN])[GAIN] == pytest.approx(0.9 * gain)
+            assert drive.sees()
+            time.sleep(0.02)
+
+        renew(drive, load_inputs)
+        end = drive.now()
+        drive.wait_for(lambda: drive.results(sent[-1]), 10, "last rejection")
+        assert drive.next_status()["participant_renewals"] == "1"
+
+        # Stamps without gap, for a subscriber and in the recording.
+        assert set(np.diff(drive.record(begin, end).joints.stamp)) == {TSP_NS}
+        assert drive.latest()["x"] == pytest.approx(MOVED, abs=1e-5)
+        assert endpoints(drive) == known
+        assert "duplicate node name" not in drive.process.output()
+
+        # Late joiners get the kept messages of the transient-local topics.
+        late = QoSProfile(
+            depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+        )
+        kept: list[TrajectoryResult] = []
+        drive.node.create_subscription(TrajectoryResult, f"{drive.target}/trajectory_result", kept.append, late)
+        drive.wait_for(lambda: len(kept) == 50, 10, "kept results")
+        assert kept[-1].sequence_number == sent[-1]
+        logs: list[Log] = []
+        drive.node.create_subscription(Log, "/rosout", logs.append, late)
+        drive.wait_for(lambda: logs, 10, "kept log messages")
+
+        # Goals: the result of a finished one is kept, and a new one is executed.
+        request = FollowJointTrajectory.Impl.GetResultService.Request()
+        request.goal_id.uuid = list(active.id)
+        response = drive.call(
+            FollowJointTrajectory.Impl.GetResultService, "follow_joint_trajectory/_action/get_result", request
+        )
+        assert response.status == GoalStatus.STATUS_SUCCEEDED
+        assert follow.send(goal(line(["z"], [0.01], 1.0))).status() == GoalStatus.STATUS_SUCCEEDED
+        with Follow(drive) as another:
+            assert another.send(goal(line(["a"], [0.01], 1.0))).status() == GoalStatus.STATUS_SUCCEEDED
+        drive.set_parameters({GAIN: gain})
+        assert drive.reset() == "at rest at home"
+    drive.process.stop()
+    messages, _, _ = read(path)
+    times = stamps(messages["/joint_states"])
+    assert times[0] < begin and times[-1] > end and set(np.diff(times)) == {TSP_NS}
+    # Each message on psec was processed once, although both participants received it.
+    results = [deserialize_message(e.data, TrajectoryResult) for e in messages["/virtual_axes/trajectory_result"]]
+    rejected = [result.sequence_number for result in results if result.status == TrajectoryResult.REJECTED]
+    assert rejected == sent
