@@ -154,3 +154,36 @@ fn words_without_effect_are_noted() {
     assert_eq!(notes("G64 P0.01 Q0.02\nG1 X1 F3000\nX2\nM2\n"), format!("note: part.nc:2: {merging}"));
     assert_eq!(notes("G64 P0.01\nG1 X1 F3000\nX2\nM2\n"), "");
 }
+
+#[test]
+fn the_page_has_the_worst_line_and_the_feed_along_the_path() {
+    let folder = TestFolder::new("part_program_page");
+    // A corner without tolerance at line 3, with a text that a page must escape, in an otherwise smooth path.
+    let text = "G61.1 F3000\nG64 P0.05 G1 X20\nX30 (a < b & \"c\")\nG1 X31 Y10\nG61 X10 Y10.5\nM2\n";
+    let name = program(&folder, text);
+    let page = folder.0.join("page.html");
+    let result = json(&["run", &name, "--json", "--report", page.to_str().expect("UTF-8")]);
+    let worst = &result["runs"][0]["part_program"]["worst_lines"];
+    let page = fs::read_to_string(page).expect("a page");
+    for part in ["<h2>Part program</h2>", "Feed along the path", "Path position (mm)", "contour error up to "]
+    {
+        assert!(page.contains(part), "{part}");
+    }
+    for line in worst.as_array().expect("lines") {
+        let text = line["text"].as_str().expect("a text").replace('&', "&amp;").replace('<', "&lt;");
+        let (number, cause) =
+            (line["line"].as_u64().expect("a line"), line["cause"].as_str().expect("a cause"));
+        let error = line["contour_error_um"].as_f64().expect("an error");
+        let row = page.split("<tr>").find(|row| row.contains(&format!(">{number}<")) && row.contains(cause));
+        let row = row.unwrap_or_else(|| panic!("no row of line {number}"));
+        assert!(row.contains(&text.replace('"', "&quot;")) || row.contains(&text), "{text}: {row}");
+        assert!(row.contains(&format!("{error:.2}")), "{row}");
+    }
+    // The page grows less than the program.
+    let longer: String = (0..10).map(|_| "G61 X20 Y0\nX30\nX31 Y10\nX10 Y10.5\n").collect();
+    let name = program(&folder, &format!("G1 F3000\n{longer}M2\n"));
+    let long_page = folder.0.join("long.html");
+    json(&["run", &name, "--json", "--report", long_page.to_str().expect("UTF-8")]);
+    let size = fs::metadata(long_page).expect("a page").len();
+    assert!(size < 4 * page.len() as u64, "{size} {}", page.len());
+}

@@ -103,7 +103,7 @@ impl Section {
         Section { heading: heading.into(), ..Section::default() }
     }
 
-    fn append_to(&self, html: &mut Html) {
+    pub(super) fn append_to(&self, html: &mut Html) {
         html.open_section("part figures", &self.heading);
         self.paragraphs.iter().for_each(|text| html.paragraph(text));
         for Notice { level, text } in &self.notices {

@@ -2,6 +2,7 @@
 
 use virtual_axes_core::assess::SignalRecording;
 
+use super::document::Section;
 use super::table::Table;
 
 /// Contents of a page with tables and plots of one or several runs.
@@ -17,6 +18,8 @@ pub struct Report<'a> {
     pub tables: Vec<Table>,
     /// Remarks below the tables, such as the sampling of the figures.
     pub notes: Vec<String>,
+    /// Sections below the figures, such as that of a part program.
+    pub sections: Vec<Section>,
     /// Runs to compare. Line styles repeat after six runs.
     pub runs: Vec<ReportRun<'a>>,
     /// Names and values that allow the runs to be repeated: date, version, command line, digest of the machine file.

@@ -34,6 +34,7 @@ impl Report<'_> {
         scatter::section(&mut page.html, scatters);
         tool::sections(&mut page);
         self.figures(&mut page.html);
+        self.sections.iter().for_each(|section| section.append_to(&mut page.html));
         axes::sections(&mut page);
         page.facts();
         if !self.provenance.is_empty() {

@@ -10,6 +10,7 @@ mod campaign;
 mod check;
 mod design;
 mod design_output;
+mod feed_along_path;
 mod figure;
 mod identify;
 mod identify_columns;

@@ -62,11 +62,22 @@ pub struct PartProgramOptions {
     pub plan: PlanOptions,
 }
 
-/// Lines of the setpoints that are not simulated yet, and the times of the program.
+/// Place of a setpoint on the path of a program.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackPoint {
+    /// Source line, from 1; 0 at the start of the program.
+    pub line: usize,
+    /// Programmed feed, m/s or rad/s; infinite at rapid traverse.
+    pub programmed_feed: f64,
+    /// Path position from the start of the program, m.
+    pub path_position: f64,
+}
+
+/// Setpoints that are not simulated yet, and the times of the program.
 #[derive(Debug, Clone, Default)]
 pub struct ProgramTrack {
-    /// Source line of each setpoint, in order.
-    pub lines: VecDeque<usize>,
+    /// Setpoints in order.
+    pub setpoints: VecDeque<TrackPoint>,
     /// Time from the first to the last setpoint, s.
     pub cycle_time: f64,
     /// Duration of all motions at their programmed feed, s.
@@ -182,7 +193,11 @@ impl GridSource for PartProgramSource<'_> {
         track.programmed_time = self.planner.programmed_time();
         let Some(setpoint) = setpoint else { return Ok(false) };
         row.copy_from_slice(setpoint.psec());
-        track.lines.push_back(setpoint.line);
+        track.setpoints.push_back(TrackPoint {
+            line: setpoint.line,
+            programmed_feed: setpoint.programmed_feed,
+            path_position: setpoint.path_position,
+        });
         track.cycle_time = time;
         self.cycle += 1;
         Ok(true)

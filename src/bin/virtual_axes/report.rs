@@ -8,7 +8,7 @@ use virtual_axes_core::assess::SignalRecording;
 use virtual_axes_core::config::{AxisConfig, AxisKind, GpcConfig, Parameters, PositionControllerConfig};
 use virtual_axes_core::units::{MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, seconds};
 use virtual_axes_io::files::OutputFile;
-use virtual_axes_report::{Report, ReportRun, Scatter};
+use virtual_axes_report::{Report, ReportRun, Scatter, Section};
 
 use crate::input::CommandInput;
 use crate::variant::VariantRun;
@@ -57,11 +57,22 @@ pub fn write(
                 recording: run.outcome.recording.as_ref().unwrap_or(&empty),
             })
             .collect(),
+        sections: runs
+            .iter()
+            .zip(&titles)
+            .filter_map(|(run, title)| part_program(run, title, runs.len()))
+            .collect(),
         provenance: provenance(machine),
     };
     let mut file = OutputFile::create(path)?;
     report.write_with(scatters, &mut file)?;
     Ok(file.finish()?)
+}
+
+/// Returns the section of a part program; its heading has the title of the run if there are several.
+fn part_program(run: &VariantRun, title: &str, runs: usize) -> Option<Section> {
+    let heading = if runs > 1 { format!("Part program: {title}") } else { "Part program".to_owned() };
+    run.part_program.as_ref().map(|program| program.section(&heading))
 }
 
 /// Machine of a report.

@@ -167,10 +167,12 @@ fn trial(
     let part_program = match lines {
         Some(lines) => {
             let track = input.track().borrow();
+            let (worst_lines, feed) = lines.finish(input.name())?;
             Some(ProgramFigures {
                 cycle_time: track.cycle_time,
                 programmed_time: track.programmed_time,
-                worst_lines: lines.finish(input.name())?,
+                worst_lines,
+                feed,
             })
         }
         None => None,

@@ -6,14 +6,15 @@ use std::io::{self, BufRead, BufReader};
 
 use nalgebra::Vector3;
 use serde_json::{Value, json};
-use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::text::escaped;
 use virtual_axes_core::trial::Tick;
 use virtual_axes_core::units::{Nanoseconds, seconds};
-use virtual_axes_report::{Table, TableColumn};
+use virtual_axes_report::{Section, Table, TableColumn};
 
-use crate::part_program_source::ProgramTrack;
+use crate::feed_along_path::FeedAlongPath;
+use crate::part_program_source::{ProgramTrack, TrackPoint};
 use crate::text_table;
 
 /// Number of lines reported.
@@ -87,27 +88,50 @@ pub struct ProgramFigures {
     pub programmed_time: f64,
     /// Lines with the largest contour errors.
     pub worst_lines: Vec<WorstLine>,
+    /// Feed along the path.
+    pub feed: FeedAlongPath,
 }
 
 impl ProgramFigures {
     /// Returns the times and a table of the worst lines.
     pub fn text(&self) -> String {
-        let times = format!(
+        let table = self.worst_table(escaped);
+        text_table::wrapped_line(&self.times()) + &text_table::aligned(&table, &[1, 2])
+    }
+
+    /// Returns a section of a page: times, worst lines and feed along the path.
+    pub fn section(&self, heading: &str) -> Section {
+        let mut table = self.worst_table(str::to_owned);
+        table.caption = "Lines with the largest contour errors".to_owned();
+        Section {
+            paragraphs: vec![format!("{}.", self.times())],
+            tables: vec![table],
+            charts: vec![self.feed.chart()],
+            ..Section::new(heading)
+        }
+    }
+
+    fn times(&self) -> String {
+        format!(
             "cycle time {:.2} s; motions at programmed feed alone {:.2} s",
             self.cycle_time, self.programmed_time
-        );
+        )
+    }
+
+    /// Returns a table of the worst lines; `escape` is applied to the texts of lines.
+    fn worst_table(&self, escape: impl Fn(&str) -> String) -> Table {
         let column =
             |name: &str, unit: &str| TableColumn { name: name.to_owned(), unit: unit.to_owned(), run: None };
         let row = |worst: &WorstLine| {
             vec![
                 worst.line.to_string(),
-                escaped(&worst.text),
+                escape(&worst.text),
                 worst.cause.text(),
                 format!("{:.2}", worst.error * 1e6),
                 format!("{:.3}", worst.time),
             ]
         };
-        let table = Table {
+        Table {
             caption: String::new(),
             columns: vec![
                 column("line", ""),
@@ -117,8 +141,7 @@ impl ProgramFigures {
                 column("time", "s"),
             ],
             rows: self.worst_lines.iter().map(row).collect(),
-        };
-        text_table::wrapped_line(&times) + &text_table::aligned(&table, &[1, 2])
+        }
     }
 
     /// Returns all figures as JSON.
@@ -144,7 +167,9 @@ impl ProgramFigures {
 struct TrackedSetpoint {
     tip: Vector3<f64>,
     joints: Vec<f64>,
-    line: usize,
+    place: TrackPoint,
+    /// Programmed feed of the tool tip, m/s; NaN where rotary axes move alone.
+    tip_feed: f64,
 }
 
 /// Contour errors by source line: distance of the simulated tool tip from the polyline of the setpoints' tips, at each
@@ -152,6 +177,9 @@ struct TrackedSetpoint {
 pub struct LineErrors {
     kinematics: Kinematics,
     names: Vec<String>,
+    is_linear: Vec<bool>,
+    /// Position period, s.
+    period: f64,
     window: VecDeque<TrackedSetpoint>,
     /// Simulated tool tips with their times, ns, that wait for later setpoints.
     tips: VecDeque<(Vector3<f64>, Nanoseconds)>,
@@ -159,6 +187,9 @@ pub struct LineErrors {
     passed: usize,
     /// Worst lines with the number of their nearest setpoint until the cause is known.
     worst: Vec<(WorstLine, Option<usize>)>,
+    /// Simulated tool tip of the position cycle before.
+    last_tip: Option<Vector3<f64>>,
+    feed: FeedAlongPath,
 }
 
 impl LineErrors {
@@ -168,10 +199,14 @@ impl LineErrors {
         Self {
             kinematics: Kinematics::new(machine),
             names,
+            is_linear: machine.axes().iter().map(|axis| axis.kind() == AxisKind::Linear).collect(),
+            period: seconds(machine.periods().position),
             window: VecDeque::new(),
             tips: VecDeque::new(),
             passed: 0,
             worst: Vec::new(),
+            last_tip: None,
+            feed: FeedAlongPath::default(),
         }
     }
 
@@ -182,9 +217,17 @@ impl LineErrors {
         }
         let samples = || tick.machine.axes().iter().map(|axis| axis.sample());
         let joints: Vec<f64> = samples().map(|sample| sample.psec).collect();
-        let line = track.lines.pop_front().or(self.window.back().map(|last| last.line)).unwrap_or(0);
+        let start = TrackPoint { line: 0, programmed_feed: f64::INFINITY, path_position: 0.0 };
+        let last = self.window.back();
+        let place = track.setpoints.pop_front().or(last.map(|last| last.place)).unwrap_or(start);
+        let moves = |linear: bool| {
+            let steps =
+                last.into_iter().flat_map(|last| last.joints.iter().zip(&joints)).zip(&self.is_linear);
+            steps.into_iter().any(|((from, to), is_linear)| *is_linear == linear && from != to)
+        };
+        let tip_feed = if moves(false) && !moves(true) { f64::NAN } else { place.programmed_feed };
         let tip = self.kinematics.forward(&joints).tip;
-        self.window.push_back(TrackedSetpoint { tip, joints, line });
+        self.window.push_back(TrackedSetpoint { tip, joints, place, tip_feed });
         if self.window.len() > WINDOW {
             self.window.pop_front();
             self.passed += 1;
@@ -208,12 +251,16 @@ impl LineErrors {
             }
         }
         if error.is_finite() {
+            let TrackedSetpoint { place, tip_feed, .. } = &self.window[nearest];
+            let reached = self.last_tip.map_or(0.0, |last| (actual - last).norm() / self.period);
+            self.feed.add(place.path_position, *tip_feed, reached, error);
             self.record(error, nearest, time);
         }
+        self.last_tip = Some(actual);
     }
 
     fn record(&mut self, error: f64, index: usize, time: Nanoseconds) {
-        let line = self.window[index].line;
+        let line = self.window[index].place.line;
         let known = self.worst.iter().position(|(worst, _)| worst.line == line);
         let least = self.worst.last().map_or(0.0, |(worst, _)| worst.error);
         let is_new =
@@ -274,12 +321,12 @@ impl LineErrors {
         }
     }
 
-    /// Returns the worst lines with their texts from the file `name`, the largest error first.
+    /// Returns the worst lines with their texts from the file `name`, the largest error first, and the feed.
     ///
     /// # Errors
     ///
     /// Returns an error if the file cannot be read.
-    pub fn finish(mut self, name: &str) -> io::Result<Vec<WorstLine>> {
+    pub fn finish(mut self, name: &str) -> io::Result<(Vec<WorstLine>, FeedAlongPath)> {
         (0..self.tips.len()).for_each(|_| self.evaluate());
         self.explain(0);
         let mut worst: Vec<WorstLine> = self.worst.into_iter().map(|(worst, _)| worst).collect();
@@ -290,7 +337,7 @@ impl LineErrors {
                 worst.text = String::from_utf8_lossy(&text).trim().chars().take(TEXT).collect();
             }
         }
-        Ok(worst)
+        Ok((worst, self.feed))
     }
 }
 

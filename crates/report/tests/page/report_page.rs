@@ -8,7 +8,7 @@ use crate::report_common::{
 };
 use virtual_axes_core::assess::{AxisTrace, CircleTrace, SignalRecording, ToolTrace};
 use virtual_axes_core::config::AxisKind;
-use virtual_axes_report::{Report, ReportRun, Table, TableColumn};
+use virtual_axes_report::{Report, ReportRun, Section, Table, TableColumn};
 
 static BALLBAR: LazyLock<[SignalRecording; 2]> =
     LazyLock::new(|| [ballbar(&[], POSITION_CYCLE, false), ballbar(&NO_FEEDFORWARD, POSITION_CYCLE, false)]);
@@ -95,6 +95,11 @@ fn untrusted_names_are_escaped() {
         title: hostile,
         description: hostile,
         verdict: vec![hostile.to_owned()],
+        sections: vec![Section {
+            paragraphs: vec![hostile.to_owned()],
+            tables: vec![table.clone()],
+            ..Section::new(hostile)
+        }],
         tables: vec![table],
         notes: vec![hostile.to_owned()],
         runs: vec![run(), run()],
