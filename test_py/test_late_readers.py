@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import threading
+import time
+
 import numpy as np
 import pytest
+import rclpy
+from rclpy.context import Context
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 
@@ -18,8 +24,47 @@ BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 JOINING = 200
 """Maximum loss while a reader is being matched."""
 LATE = 3
+SETTLED_S = 5
+"""Time without a new participant before a topic gets its next writer, s (src/ros/remote_participants.rs)."""
+JOIN_S = 1
+"""Lifetime of a joining participant, s."""
 MAY_GROW_MB = 1.5
 """Maximum memory of each late reader, MB; half a million sequence numbers take ten times that."""
+
+
+class Joining:
+    """Participants that join the graph and leave, one after the other."""
+
+    def __init__(self, domain_id: int):
+        """Sets the domain."""
+        self._domain_id = domain_id
+        self._end = threading.Event()
+        self._joined = [time.monotonic()]
+        self._thread = threading.Thread(target=self._run)
+
+    def _run(self) -> None:
+        while not self._end.is_set():
+            context = Context()
+            rclpy.init(context=context, domain_id=self._domain_id, signal_handler_options=SignalHandlerOptions.NO)
+            node = rclpy.create_node("joining", context=context, enable_rosout=False, start_parameter_services=False)
+            self._joined.append(time.monotonic())
+            self._end.wait(JOIN_S)
+            node.destroy_node()
+            rclpy.shutdown(context=context)
+
+    def longest_pause(self) -> float:
+        """Returns the longest time without a new participant so far, s."""
+        return float(np.diff([*self._joined, time.monotonic()]).max())
+
+    def __enter__(self) -> Joining:
+        """Starts the first participant."""
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Ends the last participant."""
+        self._end.set()
+        self._thread.join(30)
 
 
 def test_a_late_reader_costs_no_more_after_half_a_million_samples():
@@ -71,7 +116,16 @@ def test_a_late_reader_costs_no_more_after_half_a_million_samples():
         print(f"{LATE} late-joining readers: {grown:.1f} MB")
         assert grown < LATE * MAY_GROW_MB
 
-        # Readers that have received the dispose of the first writer discover the next writer.
+        # The next writer is created when no participant has joined for 5 s. Readers that have received the dispose of
+        # the first writer discover it.
         drive.in_executor(lambda: drive.node.destroy_subscription(subscription))
-        write_many(0.0)
+        with Joining(process.domain_id) as joining:
+            write_many(0.0)
+            until = time.monotonic() + SETTLED_S + 3
+            while time.monotonic() < until:
+                # Read before the time of the last participant, since a writer may be created after it.
+                now = writers()
+                assert now == second or joining.longest_pause() > SETTLED_S - 1
+                time.sleep(0.1)
+            assert joining.longest_pause() < SETTLED_S - 1, "participants joined too slowly for this test"
         drive.wait_for(lambda: writers() - second, 20, "next publisher")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -18,7 +19,9 @@ from sensor_msgs.msg import JointState
 from virtual_axes.msg import TrajectoryResult
 
 from action import Follow, goal, line
-from drive import TSP_NS, Drive, joint_trajectory
+from drive import NANOSECONDS, TSP_NS, Drive, joint_trajectory
+from participant import Participant
+from sim_clock import SimClock
 from test_record import read, stamps
 
 DEPARTED = 60
@@ -26,17 +29,22 @@ DEPARTED = 60
 RENEWAL_S = 60
 """Timeout of a renewal, s: rest, discovery and retention take 15 s."""
 GAIN = "x.velocity_loop.gain"
+NO_RENEWAL_S = 8
+"""Time without a renewal, s, longer than the rest before one."""
+GONE_S = 3
+"""Timeout for the removal of participants from the graph, s."""
 STREAM_S = 8
 """Duration of a stream, s, longer than the rest before a renewal."""
 MOVED = 0.02
 """Position of X before the renewal, m."""
 
 
-def leave(drive: Drive) -> None:
+def leave(drive: Drive, meanwhile: Callable[[], None] = lambda: None) -> None:
     """Creates subscriptions in another participant, which leaves when the node has discovered them."""
     assert drive.process is not None
 
     def count() -> int:
+        meanwhile()
         return int(drive.next_status()["endpoints_discovered"])
 
     before = count()
@@ -160,3 +168,62 @@ def test_a_renewal_loses_nothing(start: Callable[..., Drive], tmp_path: Path):
     results = [deserialize_message(e.data, TrajectoryResult) for e in messages["/virtual_axes/trajectory_result"]]
     rejected = [result.sequence_number for result in results if result.status == TrajectoryResult.REJECTED]
     assert rejected == sent
+
+
+def test_with_a_simulated_clock_every_sample_arrives_once(start: Callable[..., Drive]):
+    drive = start("-p", f"renewal_endpoints:={DEPARTED}", "-p", "use_sim_time:=true", connect=False)
+    clock = SimClock(drive, now=100 * NANOSECONDS)
+    clock.connect()
+    clock.advance(1.0, 0.1)
+    begin = clock.now
+
+    def advance() -> None:
+        clock.advance(0.6, 0.1)
+        time.sleep(0.1)
+
+    leave(drive, advance)
+    renew(drive, advance)
+    advance()
+    samples = drive.record(begin, clock.now)
+    for series in (samples.joints, samples.currents, samples.states):
+        assert set(np.diff(series.stamp)) == {TSP_NS}
+
+
+@pytest.mark.parametrize("setting", ["renewal_endpoints:=0", "time:=fast"])
+def test_there_is_no_renewal_if_disabled_or_in_fast(start: Callable[..., Drive], setting: str):
+    drive = start("-p", f"renewal_endpoints:={DEPARTED}", "-p", setting)
+    first = writers(drive)
+    leave(drive)
+    until = time.monotonic() + NO_RENEWAL_S
+    while time.monotonic() < until:
+        assert writers(drive) == first
+        time.sleep(0.05)
+
+
+def test_a_shutdown_during_a_renewal_removes_both_participants(start: Callable[..., Drive]):
+    drive = start("-p", f"renewal_endpoints:={DEPARTED}")
+    process = drive.process
+    leave(drive)
+    drive.wait_for(lambda: len(writers(drive)) == 2, RENEWAL_S, "second participant")
+    assert process.stop(signal.SIGTERM) == 0
+    # The process has ended; wait_for() would report that.
+    until = time.monotonic() + GONE_S
+    while drive.sees() or writers(drive):
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+def test_a_peer_that_is_not_discovered_again_is_not_lost(start: Callable[..., Drive], tmp_path: Path):
+    """A stopped process is not discovered by the new participant; the present one is kept, with its samples."""
+    drive = start("-p", f"renewal_endpoints:={DEPARTED}")
+    first = writers(drive)
+    with Participant(drive.process.domain_id, "listen", "/joint_states", 100, lease=600, folder=tmp_path) as listener:
+        listener.stop()
+        leave(drive)
+        line = "the DDS participant is not renewed"
+        drive.wait_for(lambda: line in drive.process.output(), 60 + RENEWAL_S, "failed renewal")
+        drive.wait_for(lambda: writers(drive) == first, 10, "end of the second participant")
+        assert "remote endpoints were not discovered again within 60 s" in drive.process.output()
+        listener.resume()
+        until = drive.now() + NANOSECONDS
+        drive.wait_for(lambda: listener.stamps()[-1] > until, 20, "samples of the process that continues")
