@@ -7,10 +7,11 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from action_msgs.msg import GoalStatus
+from action_msgs.msg import GoalStatus, GoalStatusArray
 from control_msgs.action import FollowJointTrajectory
 from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -136,17 +137,23 @@ def test_a_renewal_loses_nothing(start: Callable[..., Drive], tmp_path: Path):
         assert endpoints(drive) == known
         assert "duplicate node name" not in drive.process.output()
 
-        # Late joiners get the kept messages of the transient-local topics.
+        # Late joiners get the kept messages of transient-local topics, also the goal status from before the renewal.
         late = QoSProfile(
             depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
         )
-        kept: list[TrajectoryResult] = []
-        drive.node.create_subscription(TrajectoryResult, f"{drive.target}/trajectory_result", kept.append, late)
-        drive.wait_for(lambda: len(kept) == 50, 10, "kept results")
-        assert kept[-1].sequence_number == sent[-1]
-        logs: list[Log] = []
-        drive.node.create_subscription(Log, "/rosout", logs.append, late)
-        drive.wait_for(lambda: logs, 10, "kept log messages")
+        kept: dict[str, list[Any]] = {}
+        for kind, topic in (
+            (GoalStatusArray, f"{follow.name}/_action/status"),
+            (TrajectoryResult, f"{drive.target}/trajectory_result"),
+            (Log, "/rosout"),
+        ):
+            kept[topic] = []
+            drive.in_executor(lambda: drive.node.create_subscription(kind, topic, kept[topic].append, late))
+        statuses, kept_results, logs = kept.values()
+        drive.wait_for(lambda: len(kept_results) == 50 and statuses and logs, 10, "kept messages")
+        assert kept_results[-1].sequence_number == sent[-1]
+        listed = {bytes(entry.goal_info.goal_id.uuid): entry.status for entry in statuses[-1].status_list}
+        assert listed == {active.id: GoalStatus.STATUS_SUCCEEDED}
 
         # Goals: the result of a finished one is kept, and a new one is executed.
         request = FollowJointTrajectory.Impl.GetResultService.Request()
