@@ -8,8 +8,8 @@ use super::tolerance::{ErrorHistory, Tolerances};
 use super::{Simulation, stream_delay};
 use crate::machine::{MachineError, MachineParameters};
 use crate::trajectory::{
-    Admission, CancelOutcome, InvalidFeedOverride, JointSet, MotionId, Rejection, StreamCounts, StreamEnd,
-    Trajectory,
+    Admission, CancelOutcome, InvalidFeedOverride, JointSet, MotionChunk, MotionId, Rejection, StreamCounts,
+    StreamEnd, Trajectory,
 };
 use crate::units::Nanoseconds;
 
@@ -47,6 +47,28 @@ impl Simulation {
         let admission = self.timeline.submit(id, trajectory, self.grid.origin)?;
         self.motions.add(id, &axis_indices, tolerances);
         Ok(admission)
+    }
+
+    /// Begins a motion of all joints that is planned while it runs, and returns the positions at which it begins, m or
+    /// rad; see [`Timeline::begin_motion`](crate::trajectory::Timeline::begin_motion). It preempts all motions.
+    pub fn begin_motion(&mut self, id: MotionId) -> Vec<f64> {
+        let rest = self.timeline.begin_motion(id);
+        let axis_indices: Vec<usize> = (0..rest.len()).collect();
+        self.motions.add(id, &axis_indices, None);
+        rest
+    }
+
+    /// Appends a chunk to a motion; returns false if the motion has ended.
+    ///
+    /// # Errors
+    /// [`Rejection`] if the chunk does not continue the motion. Nothing changes then.
+    pub fn extend_motion(&mut self, id: MotionId, chunk: Arc<dyn MotionChunk>) -> Result<bool, Rejection> {
+        self.timeline.extend_motion(id, chunk)
+    }
+
+    /// Ends a motion with its last chunk; returns false if it has ended.
+    pub fn finish_motion(&mut self, id: MotionId) -> bool {
+        self.timeline.finish_motion(id)
     }
 
     /// Cancels a motion: its joints come to rest by a controlled stop, and it ends as

@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use crate::config::{AxisKind, MachineConfig};
 use crate::machine::{AxisSample, Machine, MachineError, MachineParameters, SimdWidth};
-use crate::trajectory::{JointLimits, Timeline, TimelineError, TimelineEvent};
+use crate::trajectory::{JointLimits, PathPlace, Timeline, TimelineError, TimelineEvent};
 use crate::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS};
 
 use loads::AxisLoads;
@@ -300,6 +300,17 @@ impl Simulation {
     /// rad; `None` for an unknown joint.
     pub fn psec_ahead(&self, joint: usize, cycles: u32) -> Option<f64> {
         self.timeline.psec_ahead(joint, cycles.saturating_add(1))
+    }
+
+    /// Returns true if the active motion that is planned while it runs needs its next chunk, see
+    /// [`Timeline::needs_chunk`]. In real time it stops on its path until the chunk is appended.
+    pub fn needs_chunk(&self) -> bool {
+        self.timeline.needs_chunk()
+    }
+
+    /// Returns the place on the path of the active motion that is planned while it runs.
+    pub fn path_place(&self) -> Option<PathPlace> {
+        self.timeline.path_place()
     }
 
     /// Returns true if a trajectory or a stop moves the setpoints.

@@ -30,11 +30,8 @@ impl Timeline {
         for joint in 0..self.queues.len() {
             let plans = &mut self.queues[joint].plans;
             let Some(index) = plans.iter().position(|plan| plan.slot == Some(slot)) else { continue };
-            for behind in plans.drain(index + 1..) {
-                if let Some(waiting) = behind.slot {
-                    self.motions.release(waiting, joint, Release::Stopped(Some(id)));
-                }
-            }
+            let behind = plans.drain(index + 1..).filter_map(|behind| behind.slot);
+            self.motions.release_each(behind, Some(slot), joint, Release::Stopped(Some(id)));
             if index == 0 {
                 // The stop takes over the slot of the motion.
                 plans[0].slot = None;
@@ -55,7 +52,7 @@ impl Timeline {
     pub fn halt(&mut self) {
         self.abort_stream();
         for joint in 0..self.queues.len() {
-            self.stop_all(joint, None);
+            self.release_all(joint, Release::Stopped(None));
             self.brake(joint, None);
         }
         self.motions.settle(&mut self.pending);

@@ -21,6 +21,7 @@
 //! | `validation` | validation of a request |
 //! | `feed_override`, `path_time` | control of the feed override, path time |
 //! | `plan` | plan of one joint |
+//! | `motion_chunks` | motion that is planned while it runs |
 //! | `motion_table` | accepted motions |
 //! | `preview`, `stream_gate`, `stream` | streamed setpoints |
 //! | `path_clock`, `timeline` | path time, queues and setpoints of all joints |
@@ -38,6 +39,7 @@ pub mod timeline;
 
 mod cancel;
 mod joint_trajectory;
+mod motion_chunks;
 mod motion_table;
 mod path_clock;
 mod path_time;
@@ -52,6 +54,7 @@ pub use event::{JointSet, MotionId, TimelineEvent};
 pub use feed_override::{InvalidFeedOverride, MAX_FEED_OVERRIDE, check_feed_override};
 pub use joint_trajectory::Trajectory;
 pub use limits::JointLimits;
+pub use motion_chunks::{MotionChunk, PathPlace};
 pub use rejection::{Rejection, RejectionCode};
 pub use request::{Start, TrajectoryPoint, TrajectoryRequest};
 pub use spline::KinematicState;

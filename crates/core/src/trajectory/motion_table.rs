@@ -84,13 +84,30 @@ impl MotionTable {
 
     /// Releases `joint` from the plan `old`: preempted by `new` before its end, completed otherwise.
     pub fn hand_over(&mut self, old: &JointPlan, new: &JointPlan, joint: usize) {
-        let Some(slot) = old.slot else { return };
+        let Some(slot) = old.slot.filter(|slot| new.slot != Some(*slot)) else { return };
         let by = new.slot.and_then(|slot| self.slots[slot].as_ref());
         let release = match by {
             Some(by) if old.nominal_end > new.nominal_start => Release::Preempted(by.id),
             _ => Release::Completed,
         };
         self.release(slot, joint, release);
+    }
+
+    /// Releases `joint` from the motions in `slots`, each once; the plans of a motion are successive. The motion in
+    /// `kept` remains.
+    pub fn release_each(
+        &mut self,
+        slots: impl Iterator<Item = usize>,
+        kept: Option<usize>,
+        joint: usize,
+        release: Release,
+    ) {
+        let mut last = kept;
+        for slot in slots {
+            if last.replace(slot) != Some(slot) {
+                self.release(slot, joint, release);
+            }
+        }
     }
 
     /// Releases `joint` from a motion; [`MotionTable::settle`] pushes the event.

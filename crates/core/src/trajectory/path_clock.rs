@@ -54,10 +54,19 @@ impl PathClock {
     }
 
     /// Advances to position cycle `k`. Without a trajectory in `queues`, the path time is that of the position cycle.
-    pub fn advance(&mut self, k: i64, period: Nanoseconds, queues: &[JointQueue]) -> PlanInstant {
+    ///
+    /// With `needs_chunk`, the active motion is not planned far enough: it stops as at a feed hold.
+    pub fn advance(
+        &mut self,
+        k: i64,
+        period: Nanoseconds,
+        queues: &[JointQueue],
+        needs_chunk: bool,
+    ) -> PlanInstant {
         if has_trajectory(queues) {
             let motion = QueuedMotion { queues, path: self.time, period };
-            let step = self.control.advance(self.target(), &motion);
+            let target = if needs_chunk { 0.0 } else { self.target() };
+            let step = self.control.advance(target, &motion);
             self.time = self.time.after(step * period as f64);
         } else {
             self.rest(k, period);
@@ -115,12 +124,21 @@ impl PlannedMotion for QueuedMotion<'_> {
     fn positions_after(&self, steps: f64, joints: &mut [f64]) {
         let path = self.path.after(steps * self.period as f64);
         let path_k = path.instant(self.period);
-        for (queue, position) in joints.iter_mut().zip(self.queues).map(|(p, q)| (q, p)) {
-            let plan = queue.plan_at(path_k).filter(|plan| plan.is_trajectory());
-            // Stops and streams do not follow the path time.
-            *position = plan.map_or(queue.state.position, |plan| {
-                plan.position(PlanInstant { k: i64::MAX, path }, self.period)
-            });
+        // One evaluation for all joints.
+        if let Some(JointPlan { kind: PlanKind::Chunk(column), .. }) =
+            self.queues.first().and_then(|queue| queue.plan_at(path_k))
+        {
+            column.chunk.positions(column.local_time(path, self.period), joints);
+        }
+        for (queue, position) in self.queues.iter().zip(joints) {
+            match queue.plan_at(path_k) {
+                Some(JointPlan { kind: PlanKind::Chunk(_), .. }) => {}
+                Some(plan) if plan.is_trajectory() => {
+                    *position = plan.position(PlanInstant { k: i64::MAX, path }, self.period);
+                }
+                // Stops and streams do not follow the path time.
+                _ => *position = queue.state.position,
+            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Plan of one joint from an instant on: a pure function of the position cycle, or of the path time for a trajectory.
 
 use super::joint_trajectory::Trajectory;
+use super::motion_chunks::ChunkColumn;
 use super::path_time::{PathTime, PlanInstant};
 use super::spline::{KinematicState, Segment};
 use super::stop::Stop;
@@ -31,6 +32,8 @@ pub(super) enum PlanKind {
     Stop { from_k: i64, stop: Stop },
     /// Column of a trajectory.
     Trajectory(TrajectoryColumn),
+    /// Column of a chunk of a motion that is planned while it runs.
+    Chunk(ChunkColumn),
 }
 
 /// Column of a trajectory, executed by one joint.
@@ -98,6 +101,7 @@ impl JointPlan {
             PlanKind::Hold(position) => KinematicState::at_rest(*position),
             PlanKind::Stop { from_k, stop } => stop.state(seconds(elapsed(*from_k, instant.k, period))),
             PlanKind::Trajectory(path) => path.state(path.local_time(instant.path, period)),
+            PlanKind::Chunk(column) => column.state(instant.path, period),
         }
     }
 
@@ -126,21 +130,26 @@ impl JointPlan {
     /// Returns true if the last setpoint is commanded at or before `instant`.
     pub fn has_ended(&self, instant: PlanInstant, period: Nanoseconds) -> bool {
         match &self.kind {
-            PlanKind::Trajectory(_) => instant.path.instant(period) >= self.end_k,
+            PlanKind::Trajectory(_) | PlanKind::Chunk(_) => instant.path.instant(period) >= self.end_k,
             _ => instant.k >= self.end_k,
         }
     }
 
     /// Returns true if the plan follows the path time.
     pub fn is_trajectory(&self) -> bool {
-        matches!(self.kind, PlanKind::Trajectory(_))
+        matches!(self.kind, PlanKind::Trajectory(_) | PlanKind::Chunk(_))
+    }
+
+    /// Returns true for the last chunk so far of a motion that is planned while it runs.
+    pub fn is_open(&self) -> bool {
+        matches!(self.kind, PlanKind::Chunk(_)) && self.end_k == i64::MAX
     }
 
     /// Returns true if the joint moves at or after `instant`.
     pub fn is_moving(&self, instant: PlanInstant, period: Nanoseconds) -> bool {
         match &self.kind {
             PlanKind::Hold(_) => false,
-            PlanKind::Stop { .. } => !self.has_ended(instant, period),
+            PlanKind::Stop { .. } | PlanKind::Chunk(_) => !self.has_ended(instant, period),
             PlanKind::Trajectory(path) => {
                 !self.has_ended(instant, period)
                     || path.trajectory.final_stop(path.column).is_some_and(|stop| {

@@ -102,9 +102,10 @@ impl Timeline {
         let slot = self.motions.open(id, trajectory.joints().len());
         let mut last_k = self.next_k;
         for &joint in trajectory.joints() {
-            self.stop_all(joint, Some(id));
+            self.release_all(joint, Release::Stopped(Some(id)));
             last_k = last_k.max(self.brake(joint, Some(slot)));
         }
+        self.stop_incomplete_motion();
         self.motions.settle(&mut self.pending);
         let end_k = join_k.saturating_add(last_k - self.next_k);
         Admission { start_k: join_k, join_k, end_k, is_late: false }
@@ -126,11 +127,9 @@ impl Timeline {
         for (column, &joint) in columns.into_iter().zip(trajectory.joints()) {
             let plans = &mut self.queues[joint].plans;
             let keep = plans.partition_point(|plan| plan.join_k < join_k);
-            for discarded in plans.drain(keep..) {
-                if let Some(slot) = discarded.slot {
-                    self.motions.release(slot, joint, Release::Preempted(id));
-                }
-            }
+            let kept = keep.checked_sub(1).and_then(|last| plans[last].slot);
+            let discarded = plans.drain(keep..).filter_map(|discarded| discarded.slot);
+            self.motions.release_each(discarded, kept, joint, Release::Preempted(id));
             plans.push_back(JointPlan {
                 slot: Some(slot),
                 join_k,
@@ -189,6 +188,7 @@ impl Timeline {
     ) -> Result<TrajectoryColumn, Rejection> {
         let joint = trajectory.joints()[column];
         let Admission { start_k, join_k, .. } = *admission;
+        self.check_planned_until(joint, join_k)?;
         let limits = &self.joints[joint];
         let plans = &self.queues[joint].plans;
         let before = plans.partition_point(|plan| plan.join_k < join_k);

@@ -1,6 +1,6 @@
 //! Real-time part of trajectory execution: one position setpoint per joint and position cycle.
 
-use super::event::{JointSet, MotionId, TimelineEvent};
+use super::event::{JointSet, TimelineEvent};
 use super::limits::JointLimits;
 use super::motion_table::{MotionTable, Release};
 use super::path_clock::PathClock;
@@ -52,6 +52,16 @@ pub(super) struct JointQueue {
     pub plans: VecDeque<JointPlan>,
     /// State commanded at the last instant.
     pub state: KinematicState,
+}
+
+impl JointQueue {
+    /// Returns the position at the end of a controlled stop, otherwise that of the last instant, m or rad.
+    pub fn end_position(&self) -> f64 {
+        match self.plans.back() {
+            Some(JointPlan { kind: PlanKind::Stop { stop, .. }, .. }) => stop.state(f64::INFINITY).position,
+            _ => self.state.position,
+        }
+    }
 }
 
 /// Invalid arguments of [`Timeline::new`].
@@ -121,13 +131,16 @@ impl Timeline {
         self.events.clear();
         self.events.append(&mut self.pending);
         self.stream.begin_instant(k, &self.psec);
-        let instant = self.clock.advance(k, period, &self.queues);
+        let needs_chunk = self.needs_chunk();
+        let instant = self.clock.advance(k, period, &self.queues, needs_chunk);
         let path_k = instant.path.instant(period);
+        let mut is_incomplete = false;
         for (joint, queue) in self.queues.iter_mut().enumerate() {
             while queue.plans.get(1).is_some_and(|plan| plan.has_joined(path_k)) {
                 let old = queue.plans.pop_front();
                 let new = queue.plans.front();
                 if let (Some(old), Some(new)) = (old, new) {
+                    is_incomplete |= matches!(old.kind, PlanKind::Chunk(_)) && old.slot != new.slot;
                     self.motions.hand_over(&old, new, joint);
                     self.motions.start(new.slot, &mut self.events);
                 }
@@ -156,6 +169,9 @@ impl Timeline {
         self.stream.finish_instant(k);
         self.clock.record(k, &self.psec, &self.queues, period);
         self.next_k += 1;
+        if is_incomplete {
+            self.stop_incomplete_motion();
+        }
         k
     }
 
@@ -225,7 +241,7 @@ impl Timeline {
         }
         self.end_stream(0..positions.len(), StreamEnd::Reset);
         for (joint, &position) in positions.iter().enumerate() {
-            self.stop_all(joint, None);
+            self.release_all(joint, Release::Stopped(None));
             let queue = &mut self.queues[joint];
             queue.plans.clear();
             queue.plans.push_back(JointPlan::hold(position));
@@ -249,12 +265,9 @@ impl Timeline {
     }
 
     /// Releases `joint` from all active and waiting motions.
-    pub(super) fn stop_all(&mut self, joint: usize, by: Option<MotionId>) {
-        for plan in &mut self.queues[joint].plans {
-            if let Some(slot) = plan.slot.take() {
-                self.motions.release(slot, joint, Release::Stopped(by));
-            }
-        }
+    pub(super) fn release_all(&mut self, joint: usize, release: Release) {
+        let slots = self.queues[joint].plans.iter_mut().filter_map(|plan| plan.slot.take());
+        self.motions.release_each(slots, None, joint, release);
     }
 }
 

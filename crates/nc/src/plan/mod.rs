@@ -12,6 +12,7 @@
 //! Limits hold for the continuous motion, so that differences of setpoints at any position period keep them.
 
 mod band;
+mod chunk;
 mod element;
 mod error;
 mod look_ahead;
@@ -28,5 +29,6 @@ mod stations;
 mod vector;
 mod window;
 
+pub use chunk::PlannedChunk;
 pub use error::{FeedPlanError, StepError};
 pub use planner::{PartProgramPlanner, PlanOptions, PlannedSetpoint};

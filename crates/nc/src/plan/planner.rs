@@ -1,5 +1,7 @@
 //! Planner of part programs: setpoints of all joints at each position cycle.
 
+use std::sync::Arc;
+
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::kinematics::{AxisRole, Kinematics};
 use virtual_axes_core::trajectory::JointLimits;
@@ -48,7 +50,7 @@ impl Default for PlanOptions {
 /// Setpoints of one position cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlannedSetpoint {
-    psec: JointVector,
+    pub(super) psec: JointVector,
     /// Source line of the motion.
     pub line: usize,
     /// Programmed feed, m/s or rad/s; infinite at rapid traverse.
@@ -102,19 +104,21 @@ impl PlannedSetpoint {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct PartProgramPlanner<I> {
-    ahead: LookAhead<I>,
+    pub(super) ahead: LookAhead<I>,
     limits: Vec<JointLimits>,
-    joints: Vec<usize>,
-    period: f64,
-    reserve: f64,
+    pub(super) joints: Vec<usize>,
+    pub(super) period: f64,
+    pub(super) reserve: f64,
     /// Time in the first interval of the window, s.
-    local: f64,
+    pub(super) local: f64,
     /// Duration of the intervals passed, s.
-    passed: f64,
+    pub(super) passed: f64,
+    /// Model of the machine for chunks.
+    pub(super) model: Arc<MachineModel>,
     control: FeedControl,
-    is_started: bool,
-    is_finished: bool,
-    last: PlannedSetpoint,
+    pub(super) is_started: bool,
+    pub(super) is_finished: bool,
+    pub(super) last: PlannedSetpoint,
 }
 
 fn positive(axis: &JointLimits) -> Result<(), FeedPlanError> {
@@ -173,7 +177,7 @@ where
         let slowest = joints.iter().map(|j| j.acceleration / j.jerk).fold(0.0, f64::max);
         let model = MachineModel { joints, kinds: axes.kinds.clone(), tip, centripetal };
         let parts = PartSource::new(steps, axes, [options.blend_tolerance, options.rotary_tolerance]);
-        let ahead = LookAhead::new(PieceSource::new(parts, options.knot_distance), model);
+        let ahead = LookAhead::new(PieceSource::new(parts, options.knot_distance), model.clone());
         let joints: Vec<usize> = (0..limits.len()).collect();
         let last = PlannedSetpoint {
             psec: ORIGIN,
@@ -191,6 +195,7 @@ where
             reserve: 2.0 * slowest + 4.0 * period,
             local: 0.0,
             passed: 0.0,
+            model: Arc::new(model),
             control,
             is_started: false,
             limits,
@@ -325,7 +330,7 @@ where
         }
     }
 
-    fn check_travel_limits(&self) -> Result<(), FeedPlanError> {
+    pub(super) fn check_travel_limits(&self) -> Result<(), FeedPlanError> {
         for (joint, &position) in self.limits.iter().zip(&self.last.psec) {
             if joint.check_travel_limits(0, position).is_err() {
                 return Err(FeedPlanError::OutsideTravelLimits {

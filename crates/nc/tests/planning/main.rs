@@ -8,3 +8,4 @@ mod optimum;
 mod profile;
 mod programs;
 mod random;
+mod timeline;
