@@ -56,7 +56,7 @@ def goal(
 class Sent:
     """Goal that was sent, with the responses so far."""
 
-    def __init__(self, follow: Follow, message: FollowJointTrajectory.Goal, uuid: UUID | None):
+    def __init__(self, follow: Follow, message: Any, uuid: UUID | None):
         """Sends the goal."""
         drive = follow.drive
         self._drive = drive
@@ -64,7 +64,7 @@ class Sent:
         self._accepting = drive.in_executor(lambda: follow.client.send_goal_async(message, goal_uuid=uuid))
 
     @property
-    def feedback(self) -> list[FollowJointTrajectory.Feedback]:
+    def feedback(self) -> list[Any]:
         """Returns the feedback so far."""
         id = self.id
         return [message.feedback for message in list(self._follow.feedback) if bytes(message.goal_id.uuid) == id]
@@ -95,11 +95,11 @@ class Sent:
         """Returns the final status, action_msgs/GoalStatus."""
         return self.ended(timeout).status
 
-    def result(self, timeout: float = 30.0) -> Result:
+    def result(self, timeout: float = 30.0) -> Any:
         """Returns the result."""
         return self.ended(timeout).result
 
-    def wait_for_feedback(self, count: int = 1, timeout: float = 20.0) -> FollowJointTrajectory.Feedback:
+    def wait_for_feedback(self, count: int = 1, timeout: float = 20.0) -> Any:
         """Waits for `count` feedback messages and returns the newest."""
         self._drive.wait_for(lambda: len(self.feedback) >= count, timeout, "feedback")
         return self.feedback[-1]
@@ -115,16 +115,16 @@ class Sent:
 class Follow:
     """Action client in the graph, part of a Drive."""
 
-    def __init__(self, drive: Drive, name: str | None = None, timeout: float = 20.0):
-        """Waits for the action server; `name` is the action's remapped name."""
+    def __init__(self, drive: Drive, name: str | None = None, timeout: float = 20.0, kind: Any = FollowJointTrajectory):
+        """Waits for the server of an action of type `kind`; `name` is the action's remapped name."""
         self.name = name or f"{drive.target}/follow_joint_trajectory"
         self.drive = drive
         self.statuses: list[GoalStatusArray] = []
-        self.client = ActionClient(drive.node, FollowJointTrajectory, self.name)
+        self.client = ActionClient(drive.node, kind, self.name)
         # Own subscriptions: the client drops a finished goal and the messages for it that are still in transit.
         self.feedback: list[Any] = []
         self._feedback = drive.node.create_subscription(
-            FollowJointTrajectory.Impl.FeedbackMessage,
+            kind.Impl.FeedbackMessage,
             f"{self.name}/_action/feedback",
             self.feedback.append,
             FEEDBACK_QOS,
@@ -152,7 +152,7 @@ class Follow:
 
         self.drive.in_executor(leave)
 
-    def send(self, message: FollowJointTrajectory.Goal, uuid: bytes | None = None) -> Sent:
+    def send(self, message: Any, uuid: bytes | None = None) -> Sent:
         """Sends a goal, with a given id if `uuid` is set."""
         return Sent(self, message, UUID(uuid=list(uuid)) if uuid else None)
 

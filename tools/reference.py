@@ -4,7 +4,8 @@
     cargo build --release && tools/reference.py           # status 1 if a stored page is out of date
     tools/reference.py --write                            # rewrites the pages
 
-Sources: `virtual_axes interface --json`, `virtual_axes parameters --json`, help texts, msg/*.msg, launch/*.launch.py.
+Sources: `virtual_axes interface --json`, `virtual_axes parameters --json`, help texts, msg/action/*.action,
+msg/*.msg, launch/*.launch.py.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import Any
 import options
 from reference_markdown import MARK, console, page, section, table
 from reference_parameters import parameter_pages
-from reference_sources import help_texts, launch_file, message
+from reference_sources import MessageSection, action, help_texts, launch_file, message
 
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAMS = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release"
@@ -69,7 +70,7 @@ class Reference:
     # ------------------------------------------------------------------------------ interface
 
     def topics(self) -> str:
-        """Returns the page of topics, services and the action."""
+        """Returns the page of topics, services and actions."""
         parts = []
         for direction, title in (("in", "Subscribed topics"), ("out", "Published topics")):
             topics = [topic for topic in self.interface["topics"] if topic["direction"] == direction]
@@ -82,10 +83,14 @@ class Reference:
             facts = [f"Type: {type_link(row['type'])}", f"Rate: {self.linked(row['rate'])}"]
             parts.append(section(f"`{row['name']}`", self.linked(row["content"]), facts))
         codes = [[str(row["code"]), row["name"], row["meaning"]] for row in self.interface["action_error_codes"]]
-        parts.append("[Action](action.md) describes tolerances and cancellation. Values of `error_code` in the result:")
+        parts.append(
+            "[Action](action.md) describes tolerances and cancellation, [part programs](part-programs.md) the action "
+            "`~/run_program`; its error codes are among the [messages](messages.md#runprogram). Values of `error_code` "
+            "in the result of `~/follow_joint_trajectory`:"
+        )
         parts += [table(["`error_code`", "name", "reason"], codes), DELIVERY]
         return page(
-            "Topics, services and the action",
+            "Topics, services and actions",
             "Everything that the node `virtual_axes_node` has in the ROS 2 graph. Units are those of ROS: m, rad, s, "
             "A, N, N·m.\n\nNames in a namespace and `~` follow ROS (`~` is the name of the node, "
             "`/virtual_axes` by default); every name can be remapped. QoS profiles are the defaults. "
@@ -169,22 +174,32 @@ def messages() -> str:
     """Returns the page of the package's own messages."""
     parts = []
     for path in sorted((ROOT / "msg").glob("*.msg")):
+        parts += [f"## {path.stem}", *definition_parts(message(path))]
+    for path in sorted((ROOT / "msg" / "action").glob("*.action")):
         parts.append(f"## {path.stem}")
-        for block in message(path):
-            if block.comment:
-                parts.append(block.comment)
-            constants = [[f"`{name}`", value, kind, text] for kind, name, value, text in block.constants]
-            if constants:
-                parts.append(table(["constant", "value", "type", "meaning"], constants))
-            fields = [[f"`{name}`", f"`{kind}`", text] for kind, name, text in block.fields]
-            if fields:
-                parts.append(table(["field", "type", "meaning"], fields))
+        for name, sections in action(path).items():
+            parts += [f"### {path.stem}: {name.lower()}", *definition_parts(sections)]
     return page(
         "Messages",
-        "Messages that the package `virtual_axes` defines, with the unit of each field. [Topics](topics.md) says where "
-        "they are published.",
+        "Messages and actions that the package `virtual_axes` defines, with the unit of each field. "
+        "[Topics](topics.md) says where the node has them.",
         *parts,
     )
+
+
+def definition_parts(sections: list[MessageSection]) -> list[str]:
+    """Returns comments and tables of a message definition."""
+    parts = []
+    for block in sections:
+        if block.comment:
+            parts.append(block.comment)
+        constants = [[f"`{name}`", value, kind, text] for kind, name, value, text in block.constants]
+        if constants:
+            parts.append(table(["constant", "value", "type", "meaning"], constants))
+        fields = [[f"`{name}`", f"`{kind}`", text] for kind, name, text in block.fields]
+        if fields:
+            parts.append(table(["field", "type", "meaning"], fields))
+    return parts
 
 
 def launch() -> str:

@@ -27,8 +27,19 @@ class MessageSection:
 
 def message(path: Path) -> list[MessageSection]:
     """Returns the sections of a message definition; the first one holds the description of the message."""
+    return definition(path.read_text(encoding="utf-8"), path)
+
+
+def action(path: Path) -> dict[str, list[MessageSection]]:
+    """Returns the sections of goal, result and feedback of an action definition."""
+    parts = path.read_text(encoding="utf-8").split("\n---\n")
+    return {name: definition(part, path) for name, part in zip(("Goal", "Result", "Feedback"), parts, strict=True)}
+
+
+def definition(text: str, path: Path) -> list[MessageSection]:
+    """Returns the sections of a definition in the file `path`."""
     sections = []
-    for block in path.read_text(encoding="utf-8").strip().split("\n\n"):
+    for block in text.strip().split("\n\n"):
         section = MessageSection()
         for line in block.splitlines():
             if line.startswith("#"):

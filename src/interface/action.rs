@@ -1,6 +1,6 @@
 //! Action of the node and its error codes.
 
-use virtual_axes_io::messages::{CONTROL_PACKAGE, ErrorCode};
+use virtual_axes_io::messages::{CONTROL_PACKAGE, ErrorCode, PACKAGE};
 
 use super::{ActionErrorCode, NodeAction};
 
@@ -13,15 +13,24 @@ pub const FOLLOW_JOINT_TRAJECTORY: NodeAction = NodeAction {
     rate: "feedback at `action_monitor_rate`",
 };
 
+/// Action that runs a part program.
+pub const RUN_PROGRAM: NodeAction = NodeAction {
+    name: "~/run_program",
+    package: PACKAGE,
+    action: "RunProgram",
+    content: "a part program from a file or a text, with feedback and canceling",
+    rate: "feedback at `action_monitor_rate`",
+};
+
 /// All actions.
-pub const ACTIONS: &[NodeAction] = &[FOLLOW_JOINT_TRAJECTORY];
+pub const ACTIONS: &[NodeAction] = &[FOLLOW_JOINT_TRAJECTORY, RUN_PROGRAM];
 
 /// Creates an error code.
 const fn code(code: ErrorCode, name: &'static str, meaning: &'static str) -> ActionErrorCode {
     ActionErrorCode { code: code as i32, name, meaning }
 }
 
-/// Values of `error_code` in the result of the action.
+/// Values of `error_code` in the result of `~/follow_joint_trajectory`.
 pub const ACTION_ERROR_CODES: &[ActionErrorCode] = &[
     code(
         ErrorCode::Successful,

@@ -4,10 +4,13 @@ use std::sync::Arc;
 
 use tokio::sync::oneshot;
 
+use super::program::ProgramRunFigures;
 use crate::ingress::StreamSetpoints;
 use virtual_axes_core::machine::{AxisSample, MachineParameters};
 use virtual_axes_core::simulation::{MotionEnd, Tolerances};
-use virtual_axes_core::trajectory::{JointSet, MotionId, Rejection, StreamEnd, Trajectory};
+use virtual_axes_core::trajectory::{
+    JointSet, MotionChunk, MotionId, PathPlace, Rejection, StreamEnd, Trajectory,
+};
 use virtual_axes_core::units::Nanoseconds;
 
 /// Capacity of the command queue. A sender waits while the queue is full.
@@ -25,6 +28,24 @@ pub enum Command {
         /// Path and goal tolerances.
         tolerances: Option<Box<Tolerances>>,
     },
+    /// Begins a motion that is planned while it runs.
+    BeginMotion {
+        /// Identifier of the motion.
+        id: MotionId,
+        /// Indices of the linear axes.
+        linear: Vec<usize>,
+        /// Sender of the positions at which it begins, m or rad.
+        rest: oneshot::Sender<Vec<f64>>,
+    },
+    /// Appends a chunk to a motion that is planned while it runs.
+    ExtendMotion {
+        /// Identifier of the motion.
+        id: MotionId,
+        /// Chunk.
+        chunk: Arc<dyn MotionChunk>,
+    },
+    /// Ends a motion that is planned while it runs with its last chunk.
+    FinishMotion(MotionId),
     /// Stops every joint; the motion is not reported.
     Stop(MotionId, Arc<Trajectory>),
     /// Cancels a motion, and returns true if it was active or waiting.
@@ -66,8 +87,19 @@ pub enum SimulationReport {
     Decision(MotionId, Nanoseconds, Result<Accepted, Rejection>),
     /// End of a motion.
     MotionEnded(MotionEnd),
+    /// End of a part program.
+    ProgramEnded(MotionEnd, ProgramRunFigures),
     /// End of a stream on some joints, with its time, ns. The last field counts the unread reports of this kind.
     StreamEnded(Nanoseconds, StreamEnd, JointSet, Arc<()>),
+}
+
+/// Place of a part program at one position cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ProgramPlace {
+    /// Motion of the program.
+    pub motion: MotionId,
+    /// Place on the path.
+    pub place: PathPlace,
 }
 
 /// Samples of all axes at one position cycle.
@@ -81,6 +113,8 @@ pub struct SampleFrame {
     pub samples: Vec<AxisSample>,
     /// Feed override in effect.
     pub feed_rate: f64,
+    /// Place of the active part program.
+    pub program: Option<ProgramPlace>,
     /// Number of resets before the instant.
     pub resets: u64,
     /// Accepted motions that had not ended before the instant, with their start times, ns.

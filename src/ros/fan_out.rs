@@ -16,6 +16,7 @@ use super::convert;
 use super::diagnostics::Diagnostics;
 use super::health::Health;
 use super::outputs::Output;
+use super::program::ProgramFeedbackOutput;
 use super::recorder::RecordingStatus;
 use super::setpoints::{SetpointVelocities, controller_state};
 use super::tool::ToolOutput;
@@ -36,6 +37,8 @@ pub struct FanOut {
     pub controller_state: Output<JointTrajectoryControllerState>,
     /// Feedback of the action.
     pub feedback: FeedbackOutput,
+    /// Feedback of the part program.
+    pub program: ProgramFeedbackOutput,
     /// Pose and paths of the tool, if the machine has joints that move it.
     pub tool: Option<ToolOutput>,
     /// Output `/clock`, in `fast`.
@@ -74,6 +77,7 @@ impl FanOut {
                 }
             }
             self.feedback.publish(&frame, velocities).await;
+            self.program.publish(&frame).await;
         }
     }
 }

@@ -63,7 +63,7 @@ impl PsecInput {
         match validated {
             Ok(trajectory) => {
                 let id = next_motion_id(&self.ids);
-                self.results.register(id, origin, Arc::clone(&trajectory)).await;
+                self.results.register(id, origin, Some(Arc::clone(&trajectory))).await;
                 // The channel is closed only at shutdown.
                 let _ = self.commands.send(Command::Submit { id, trajectory, tolerances: None }).await;
             }

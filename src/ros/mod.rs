@@ -48,6 +48,7 @@ mod parameter_host;
 pub mod parameter_services;
 pub mod participant;
 mod process_memory;
+mod program;
 mod readers;
 mod recorder;
 mod remote_endpoints;

@@ -13,6 +13,7 @@ use super::axes_interface::{Accepted, SimulationReport};
 use super::convert::{header, stamp};
 use super::goal_event::{GoalEvent, GoalId, goal_name};
 use super::outputs::Output;
+use super::program::{ProgramGoalEvent, ProgramRunFigures};
 use crate::ingress::AdmissionControl;
 use virtual_axes_core::assess::AxisReport;
 use virtual_axes_core::simulation::{AbortReason, MotionEnd, MotionOutcome, Quantity, ToleranceViolation};
@@ -39,6 +40,11 @@ pub enum Origin {
         /// Identifier of the goal.
         goal_id: GoalId,
     },
+    /// Goal of the action that runs a part program.
+    Program {
+        /// Identifier of the goal.
+        goal_id: GoalId,
+    },
 }
 
 /// Formats the origin for messages.
@@ -46,7 +52,7 @@ impl fmt::Display for Origin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Origin::Topic { sequence_number, .. } => write!(f, "trajectory {sequence_number} of psec"),
-            Origin::Action { goal_id, .. } => f.write_str(&goal_name(goal_id)),
+            Origin::Action { goal_id, .. } | Origin::Program { goal_id } => f.write_str(&goal_name(goal_id)),
         }
     }
 }
@@ -75,6 +81,9 @@ impl Origin {
             Origin::Action { stamp, goal_id } => {
                 TrajectoryResult { source: Source::Action as u8, trajectory_stamp: stamp, goal_id, ..result }
             }
+            Origin::Program { goal_id } => {
+                TrajectoryResult { source: Source::Program as u8, goal_id, ..result }
+            }
         }
     }
 }
@@ -84,7 +93,7 @@ struct ActiveTrajectory {
     origin: Origin,
     start: Time,
     /// Reference that keeps the axes' thread from freeing the trajectory.
-    _trajectory: Arc<Trajectory>,
+    _trajectory: Option<Arc<Trajectory>>,
 }
 
 /// Publisher of results, with the origins of the trajectories that have not ended.
@@ -93,23 +102,28 @@ pub struct TrajectoryResults {
     joints: Vec<JointLimits>,
     /// Sender of goal events, at most two for each goal.
     goal_events: mpsc::UnboundedSender<GoalEvent>,
+    /// Sender of events of part programs, at most two for each goal.
+    program_events: mpsc::UnboundedSender<ProgramGoalEvent>,
     active: Mutex<HashMap<MotionId, ActiveTrajectory>>,
     admission: AdmissionControl,
 }
 
 impl TrajectoryResults {
-    /// Creates the results of a machine with `joints`, which also sends the events of action goals to `goal_events`.
+    /// Creates the results of a machine with `joints`, which also sends the events of action goals to `goal_events` and
+    /// `program_events`.
     /// A trajectory has at most `max_points` points.
     pub fn new(
         output: Output<TrajectoryResult>,
         joints: Vec<JointLimits>,
         goal_events: mpsc::UnboundedSender<GoalEvent>,
+        program_events: mpsc::UnboundedSender<ProgramGoalEvent>,
         max_points: usize,
     ) -> Self {
         TrajectoryResults {
             output,
             joints,
             goal_events,
+            program_events,
             active: Mutex::new(HashMap::new()),
             admission: AdmissionControl::new(max_points),
         }
@@ -124,8 +138,8 @@ impl TrajectoryResults {
         self.admission.admit(trajectory)
     }
 
-    /// Stores the origin of a trajectory; called before its submission.
-    pub async fn register(&self, id: MotionId, origin: Origin, trajectory: Arc<Trajectory>) {
+    /// Stores the origin of a trajectory, or of a part program; called before its submission.
+    pub async fn register(&self, id: MotionId, origin: Origin, trajectory: Option<Arc<Trajectory>>) {
         let active = ActiveTrajectory { origin, start: Time::default(), _trajectory: trajectory };
         self.active.lock().await.insert(id, active);
     }
@@ -140,12 +154,19 @@ impl TrajectoryResults {
                 let trajectory = self.active.lock().await.remove(&id);
                 if let Some(trajectory) = trajectory {
                     self.publish_rejection(&trajectory.origin, time, &rejection).await;
-                    if let Origin::Action { goal_id, .. } = trajectory.origin {
-                        self.send_goal_event(GoalEvent::Rejected(goal_id, rejection));
+                    match trajectory.origin {
+                        Origin::Action { goal_id, .. } => {
+                            self.send_goal_event(GoalEvent::Rejected(goal_id, rejection));
+                        }
+                        Origin::Program { goal_id } => {
+                            self.send_program_event(ProgramGoalEvent::Rejected(goal_id, rejection));
+                        }
+                        Origin::Topic { .. } => {}
                     }
                 }
             }
-            SimulationReport::MotionEnded(end) => self.publish_end(end).await,
+            SimulationReport::MotionEnded(end) => self.publish_end(end, None).await,
+            SimulationReport::ProgramEnded(end, figures) => self.publish_end(end, Some(figures)).await,
             SimulationReport::StreamEnded(time, end, joints, unread) => {
                 self.publish_stream_end(time, end, joints).await;
                 drop(unread);
@@ -175,6 +196,11 @@ impl TrajectoryResults {
         let _ = self.goal_events.send(event);
     }
 
+    /// Sends an event of a part program; at shutdown it has no receiver.
+    fn send_program_event(&self, event: ProgramGoalEvent) {
+        let _ = self.program_events.send(event);
+    }
+
     /// Returns the text of a violated `path` or `goal` tolerance.
     fn violation_text(&self, tolerance: &str, violation: &ToleranceViolation) -> String {
         let ToleranceViolation { axis_index, quantity, error, limit } = *violation;
@@ -199,8 +225,10 @@ impl TrajectoryResults {
             trajectory.start = start.clone();
             trajectory.origin.clone()
         };
-        if let Origin::Action { goal_id, .. } = origin {
-            self.send_goal_event(GoalEvent::Started(goal_id));
+        match origin {
+            Origin::Action { goal_id, .. } => self.send_goal_event(GoalEvent::Started(goal_id)),
+            Origin::Program { goal_id } => self.send_program_event(ProgramGoalEvent::Started(goal_id)),
+            Origin::Topic { .. } => {}
         }
         let text = if accepted.is_late {
             let late = Rounded(seconds(time - accepted.start));
@@ -240,7 +268,7 @@ impl TrajectoryResults {
             .await;
     }
 
-    async fn publish_end(&self, end: MotionEnd) {
+    async fn publish_end(&self, end: MotionEnd, program: Option<ProgramRunFigures>) {
         let mut active = self.active.lock().await;
         let Some(trajectory) = active.remove(&end.id) else { return };
         let (status, text) = match end.outcome {
@@ -268,8 +296,15 @@ impl TrajectoryResults {
         } else {
             info!("{line}")
         }
-        if let Origin::Action { goal_id, .. } = trajectory.origin {
-            self.send_goal_event(GoalEvent::Ended(goal_id, end.outcome, text.clone()));
+        match trajectory.origin {
+            Origin::Action { goal_id, .. } => {
+                self.send_goal_event(GoalEvent::Ended(goal_id, end.outcome, text.clone()));
+            }
+            Origin::Program { goal_id } => {
+                let end = Box::new((end.clone(), program.unwrap_or_default()));
+                self.send_program_event(ProgramGoalEvent::Ended(goal_id, end, text.clone()));
+            }
+            Origin::Topic { .. } => {}
         }
         let column = |value: fn(&AxisReport) -> f64| end.report.axes.iter().map(value).collect();
         let name =

@@ -29,3 +29,6 @@
 pub mod interpret;
 pub mod motion;
 pub mod plan;
+mod start_line;
+
+pub use start_line::{StartLine, StartLineError};

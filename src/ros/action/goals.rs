@@ -10,7 +10,7 @@ use virtual_axes_core::trajectory::MotionId;
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
 use virtual_axes_io::messages::action_msgs::msg::{GoalInfo, GoalStatus, GoalStatusArray};
 use virtual_axes_io::messages::action_msgs::srv::{CancelGoalRequest, CancelGoalResponse};
-use virtual_axes_io::messages::{FollowJointTrajectoryResult, GetResultResponse, stamp};
+use virtual_axes_io::messages::{GetResultResponse, stamp};
 
 /// Largest number of active goals; each owns its trajectory.
 pub(super) const MAX_ACTIVE_GOALS: usize = 1024;
@@ -24,7 +24,7 @@ const MAX_RESULT_REQUESTS: usize = 4096;
 /// State of a goal, with the numbers of action_msgs/GoalStatus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(i8)]
-pub(super) enum GoalState {
+pub enum GoalState {
     /// Accepted by the server; the simulation has not decided yet.
     Accepted = GoalStatus::STATUS_ACCEPTED,
     /// Accepted by the simulation.
@@ -40,17 +40,17 @@ pub(super) enum GoalState {
 }
 
 #[derive(Debug)]
-struct Goal {
+struct Goal<R> {
     id: GoalId,
     stamp: Nanoseconds,
     state: GoalState,
     motion: Option<MotionId>,
     waiting: Vec<RmwRequestId>,
     /// Result and its time.
-    ended: Option<(FollowJointTrajectoryResult, Instant)>,
+    ended: Option<(R, Instant)>,
 }
 
-impl Goal {
+impl<R> Goal<R> {
     fn info(&self) -> GoalInfo {
         GoalInfo { goal_id: uuid(self.id), stamp: stamp(self.stamp) }
     }
@@ -58,28 +58,29 @@ impl Goal {
 
 /// Reply to a result request.
 #[derive(Debug, PartialEq)]
-pub(super) enum ResultReply {
+pub(super) enum ResultReply<R> {
     /// Response to be sent at once.
-    Ready(GetResultResponse),
+    Ready(GetResultResponse<R>),
     /// Deferred until the goal ends.
     Pending,
 }
 
 /// Table of goals in the order of acceptance.
-#[derive(Debug, Default)]
-pub(super) struct GoalTable {
-    list: Vec<Goal>,
+#[derive(Debug)]
+pub(super) struct GoalTable<R> {
+    list: Vec<Goal<R>>,
 }
 
-impl GoalTable {
+impl<R> Default for GoalTable<R> {
+    fn default() -> Self {
+        Self { list: Vec::new() }
+    }
+}
+
+impl<R: Clone + Default> GoalTable<R> {
     /// Returns true if the id is in use.
     pub fn contains(&self, id: &GoalId) -> bool {
         self.list.iter().any(|goal| goal.id == *id)
-    }
-
-    /// Returns the number of active goals.
-    pub fn active_count(&self) -> usize {
-        self.list.iter().filter(|goal| goal.ended.is_none()).count()
     }
 
     /// Returns the ids of the active goals.
@@ -87,7 +88,7 @@ impl GoalTable {
         self.list.iter().filter(|goal| goal.ended.is_none()).map(|goal| goal.id).collect()
     }
 
-    fn find(&mut self, id: &GoalId) -> Option<&mut Goal> {
+    fn find(&mut self, id: &GoalId) -> Option<&mut Goal<R>> {
         self.list.iter_mut().find(|goal| goal.id == *id)
     }
 
@@ -119,9 +120,9 @@ impl GoalTable {
         &mut self,
         id: &GoalId,
         state: GoalState,
-        result: FollowJointTrajectoryResult,
+        result: R,
         now: Instant,
-    ) -> (Vec<RmwRequestId>, GetResultResponse) {
+    ) -> (Vec<RmwRequestId>, GetResultResponse<R>) {
         let response = GetResultResponse { status: state as i8, result: result.clone() };
         let waiting = match self.find(id) {
             Some(goal) if goal.ended.is_none() => {
@@ -136,7 +137,7 @@ impl GoalTable {
     }
 
     /// Returns the reply to a result request; a deferred request is added to the goal.
-    pub fn request_result(&mut self, id: &GoalId, request: RmwRequestId) -> ResultReply {
+    pub fn request_result(&mut self, id: &GoalId, request: RmwRequestId) -> ResultReply<R> {
         let waiting = self.list.iter().map(|goal| goal.waiting.len()).sum::<usize>();
         match self.find(id) {
             Some(Goal { state, ended: Some((result, _)), .. }) => {
@@ -177,7 +178,7 @@ impl GoalTable {
 
     /// Returns the message of the status topic.
     pub fn status_message(&self) -> GoalStatusArray {
-        let status = |goal: &Goal| GoalStatus { goal_info: goal.info(), status: goal.state as i8 };
+        let status = |goal: &Goal<R>| GoalStatus { goal_info: goal.info(), status: goal.state as i8 };
         GoalStatusArray { status_list: self.list.iter().map(status).collect() }
     }
 
@@ -198,6 +199,10 @@ impl GoalTable {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use virtual_axes_io::messages::FollowJointTrajectoryResult;
+
+    type GoalTable = super::GoalTable<FollowJointTrajectoryResult>;
+    type ResultReply = super::ResultReply<FollowJointTrajectoryResult>;
 
     fn id(number: u16) -> GoalId {
         let mut id = [7; 16];

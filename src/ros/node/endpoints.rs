@@ -6,11 +6,12 @@ use ros2_interfaces_jazzy_serde::rcl_interfaces::msg::Log;
 use super::NodeError;
 use super::setup::NodeSetup;
 use crate::interface::{CYCLE_START, FEED_HOLD, RESET, STOP};
-use crate::ros::action::{ActionServer, ActionTopics};
+use crate::ros::action::{ActionServer, ActionTopics, TrajectoryGoals};
 use crate::ros::args::RosArgs;
 use crate::ros::endpoints::{Endpoints, Publisher};
 use crate::ros::parameter_services::ParameterServices;
 use crate::ros::participant::create_node;
+use crate::ros::program::ProgramGoals;
 use crate::ros::recorder::TopicRecorder;
 use crate::ros::renewable::EndpointContext;
 use crate::ros::rosout;
@@ -19,6 +20,7 @@ use crate::ros::topics::Topics;
 use crate::ros::trigger::TriggerService;
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::kinematics::Kinematics;
+use virtual_axes_io::messages::{FollowJointTrajectoryFeedback, RunProgramFeedback};
 
 /// ROS node with its topics, services and action.
 pub(super) struct NodeEndpoints {
@@ -26,8 +28,10 @@ pub(super) struct NodeEndpoints {
     pub(super) rosout: Option<Publisher<Log>>,
     pub(super) topics: Topics,
     pub(super) tool: Option<ToolTopics>,
-    pub(super) action: ActionServer,
-    pub(super) action_topics: ActionTopics,
+    pub(super) action: ActionServer<TrajectoryGoals>,
+    pub(super) action_topics: ActionTopics<FollowJointTrajectoryFeedback>,
+    pub(super) program: ActionServer<ProgramGoals>,
+    pub(super) program_topics: ActionTopics<RunProgramFeedback>,
     pub(super) services: NodeServices,
 }
 
@@ -60,13 +64,24 @@ impl NodeEndpoints {
         let tool = ToolTopics::create(&mut endpoints, Kinematics::new(&setup.config))?;
         topics.names.add_published(tool.as_ref().map_or(&[], |tool| &tool.names));
         let (action, action_topics) = ActionServer::new(&mut node, context, args)?;
-        topics.names.actions.push(action_topics.name.clone());
+        let (program, program_topics) = ActionServer::new(&mut node, context, args)?;
+        topics.names.actions.extend([action_topics.name.clone(), program_topics.name.clone()]);
         let reset = TriggerService::new(&mut node, context, args, &RESET)?;
         let stop = TriggerService::new(&mut node, context, args, &STOP)?;
         let feed_hold = TriggerService::new(&mut node, context, args, &FEED_HOLD)?;
         let cycle_start = TriggerService::new(&mut node, context, args, &CYCLE_START)?;
         let parameters = ParameterServices::new(&mut node, context, args)?;
         let services = NodeServices { reset, stop, feed_hold, cycle_start, parameters };
-        Ok(NodeEndpoints { node, rosout, topics, tool, action, action_topics, services })
+        Ok(NodeEndpoints {
+            node,
+            rosout,
+            topics,
+            tool,
+            action,
+            action_topics,
+            program,
+            program_topics,
+            services,
+        })
     }
 }

@@ -85,7 +85,17 @@ async fn serve(
     let mut recorder = TopicRecorder::open(&setup.node_config, setup.overflow, &health)?;
     let context = EndpointContext::new(participants.context()?);
     let endpoints = NodeEndpoints::create(&context, args, &parameters, &setup, &mut recorder)?;
-    let NodeEndpoints { node, rosout, topics, tool, action, action_topics, services } = endpoints;
+    let NodeEndpoints {
+        node,
+        rosout,
+        topics,
+        tool,
+        action,
+        action_topics,
+        program,
+        program_topics,
+        services,
+    } = endpoints;
     let Topics { subscriptions, publishers: topics, names } = topics;
 
     let (axes_thread, AxesThreadEnds { commands, frames, reports }) = AxesThread::new(&setup, health_out)?;
@@ -98,14 +108,24 @@ async fn serve(
         tool,
         action_status: action_topics.status,
         action_feedback: action_topics.feedback,
+        program_status: program_topics.status,
+        program_feedback: program_topics.feedback,
     };
     let dds = context.domain_participant();
     let outputs = start_outputs(publishers, &dds, &setup, &clock, &dropped, &mut tasks);
     static_peers::announce(participants.clone(), dds.domain_id());
     // A renewal drops this participant.
     drop(dds);
-    let NodeOutputs { rosout, fan_out, results, diagnostics, action: action_outputs, tracker, rotated } =
-        outputs;
+    let NodeOutputs {
+        rosout,
+        fan_out,
+        results,
+        diagnostics,
+        action: action_outputs,
+        program: program_outputs,
+        tracker,
+        rotated,
+    } = outputs;
     let mut tasks = NodeTasks {
         args,
         setup: &setup,
@@ -122,6 +142,7 @@ async fn serve(
     let discovered = tasks.spawn_discovery(tracker, rotated, node, context);
     tasks.spawn_clock_input(subscriptions.clock, clock_out);
     let action = tasks.spawn_trajectory_inputs(action, action_outputs, subscriptions.psec);
+    let program = tasks.spawn_program_server(program, program_outputs);
     let inputs = tasks.stream_and_load_inputs(subscriptions.psec_stream, subscriptions.load);
     tasks.spawn_feed_override_input(subscriptions.feed_override);
     tasks.spawn_services(services, parameters);
@@ -135,6 +156,6 @@ async fn serve(
 
     signals.wait().await;
     let NodeTasks { commands, tasks, .. } = tasks;
-    ShutdownSequence { action, commands, tasks, thread_ended, recording }.run().await;
+    ShutdownSequence { actions: [action, program], commands, tasks, thread_ended, recording }.run().await;
     Ok(())
 }

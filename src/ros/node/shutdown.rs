@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use futures::future::join_all;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinSet;
@@ -47,7 +48,7 @@ impl ShutdownSignals {
 
 /// Ordered shutdown of the node.
 pub(super) struct ShutdownSequence {
-    pub(super) action: ShutdownHandle,
+    pub(super) actions: [ShutdownHandle; 2],
     pub(super) commands: mpsc::Sender<Command>,
     pub(super) tasks: JoinSet<()>,
     /// Confirmation that the axes' thread has ended.
@@ -58,7 +59,8 @@ pub(super) struct ShutdownSequence {
 impl ShutdownSequence {
     /// Aborts active goals, ends the tasks and the axes' thread, and closes the recording.
     pub(super) async fn run(mut self) {
-        let _ = timeout(SHUTDOWN_TIMEOUT, self.action.shut_down()).await;
+        let actions = self.actions.map(ShutdownHandle::shut_down);
+        let _ = timeout(SHUTDOWN_TIMEOUT, join_all(actions)).await;
         // The tasks end before the thread, so that it cannot wait for an output.
         let _ = timeout(SHUTDOWN_TIMEOUT, self.commands.send(Command::Shutdown)).await;
         if timeout(SHUTDOWN_TIMEOUT, self.tasks.shutdown()).await.is_err() {

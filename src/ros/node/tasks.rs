@@ -1,5 +1,6 @@
 //! Tasks of the node: reception of messages, goals and requests, and publication of reports.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
@@ -17,10 +18,10 @@ use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 
 use super::endpoints::NodeServices;
-use super::outputs::ActionOutputs;
+use super::outputs::{ActionOutputs, ProgramOutputs};
 use super::requests::{reset_axes, set_feed_hold, stop_axes, stop_of_all_joints};
 use super::setup::NodeSetup;
-use crate::ros::action::{ActionChannels, ActionServer, GoalValidator, ServerContext, ShutdownHandle};
+use crate::ros::action::{ActionChannels, ActionServer, GoalValidator, ShutdownHandle, TrajectoryGoals};
 use crate::ros::args::RosArgs;
 use crate::ros::axes_interface::{Command, SimulationReport};
 use crate::ros::clock::{ClockInput, ClockState};
@@ -37,6 +38,7 @@ use crate::ros::outputs::Output;
 use crate::ros::own_participants::OwnParticipants;
 use crate::ros::pace::{CooperativeTasks, Pace};
 use crate::ros::parameter_host::{LiveNodeParameters, NodeParameterHost};
+use crate::ros::program::ProgramGoals;
 use crate::ros::recorder::{RecordingStatus, Tap};
 use crate::ros::remote_endpoints::DiscoveredEndpoints;
 use crate::ros::renewable::EndpointContext;
@@ -117,7 +119,7 @@ impl NodeTasks<'_> {
     /// Starts the action server and the input `psec`.
     pub(super) fn spawn_trajectory_inputs(
         &mut self,
-        action: ActionServer,
+        action: ActionServer<TrajectoryGoals>,
         outputs: ActionOutputs,
         psec: Subscription<JointTrajectory>,
     ) -> ShutdownHandle {
@@ -128,15 +130,18 @@ impl NodeTasks<'_> {
             live: Arc::clone(&self.live),
         });
         let (handle, shutdown) = ShutdownHandle::new();
-        let context = ServerContext {
+        let ActionOutputs { status, running, events } = outputs;
+        let handler = TrajectoryGoals {
             validator: GoalValidator { trajectories: Arc::clone(&validator) },
             commands: self.commands.clone(),
             results: Arc::clone(&self.results),
-            health: self.health.clone(),
             ids: Arc::clone(&self.ids),
+            running: Vec::new(),
+            running_out: running,
         };
-        let ActionOutputs { status, running, events } = outputs;
-        self.tasks.spawn(action.serve(ActionChannels { context, events, running, status, shutdown }));
+        let (commands, health) = (self.commands.clone(), self.health.clone());
+        let channels = ActionChannels { handler, events, commands, health, status, shutdown };
+        self.tasks.spawn(action.serve(channels));
         let psec_input = PsecInput {
             validator,
             commands: self.commands.clone(),
@@ -145,6 +150,29 @@ impl NodeTasks<'_> {
             ids: Arc::clone(&self.ids),
         };
         self.tasks.spawn(psec_input.run(psec));
+        handle
+    }
+
+    /// Starts the server of part programs.
+    pub(super) fn spawn_program_server(
+        &mut self,
+        server: ActionServer<ProgramGoals>,
+        outputs: ProgramOutputs,
+    ) -> ShutdownHandle {
+        let (handle, shutdown) = ShutdownHandle::new();
+        let ProgramOutputs { status, running, events } = outputs;
+        let handler = ProgramGoals {
+            machine: Arc::new(self.setup.config.clone()),
+            joints: self.setup.joints.clone(),
+            commands: self.commands.clone(),
+            results: Arc::clone(&self.results),
+            ids: Arc::clone(&self.ids),
+            running_out: running,
+            programs: HashMap::new(),
+        };
+        let (commands, health) = (self.commands.clone(), self.health.clone());
+        let channels = ActionChannels { handler, events, commands, health, status, shutdown };
+        self.tasks.spawn(server.serve(channels));
         handle
     }
 

@@ -9,6 +9,7 @@ use tracing::{info, warn};
 use crate::ros::arc_pool::ArcPool;
 use crate::ros::axes_interface::{Accepted, COMMAND_QUEUE, Command, SampleFrame, SimulationReport};
 use crate::ros::health::{AxisHealth, ClockHealth, Health};
+use crate::ros::program::ProgramMonitor;
 use crate::ros::stream::StreamIntake;
 use virtual_axes_core::simulation::Simulation;
 use virtual_axes_core::trajectory::{MotionId, Rejection, RejectionCode};
@@ -30,6 +31,8 @@ pub(super) struct Axes {
     frames: ArcPool<SampleFrame>,
     /// Active stops, whose ends are not reported.
     stops: Vec<MotionId>,
+    /// Figures of the active part program.
+    program: Option<ProgramMonitor>,
     /// Counter of the unread reports on stream ends.
     stream_ends: Arc<()>,
 }
@@ -43,7 +46,8 @@ impl Axes {
         health.send_modify(|h| h.axes = vec![AxisHealth::default(); simulation.samples().len()]);
         let (stream, frames) = (StreamIntake::default(), ArcPool::default());
         let (motions, stops, stream_ends) = (Vec::new(), Vec::new(), Arc::new(()));
-        Axes { simulation, reports, health, stream, resets: 0, motions, frames, stops, stream_ends }
+        let program = None;
+        Axes { simulation, reports, health, stream, resets: 0, motions, frames, stops, program, stream_ends }
     }
 
     pub(super) fn simulation(&self) -> &Simulation {
@@ -57,15 +61,20 @@ impl Axes {
 
     /// Computes the next position cycle.
     pub(super) fn step(&mut self) -> Arc<SampleFrame> {
-        let Axes { simulation, stream, resets, motions, frames, .. } = self;
+        let Axes { simulation, stream, resets, motions, frames, program, .. } = self;
         let instant = simulation.next_instant();
         simulation.step();
         stream.check_gaps(simulation);
+        let time = simulation.time_of(instant);
+        let track =
+            |track: &mut ProgramMonitor| track.update(time, simulation.path_place(), simulation.samples());
+        let place = program.as_mut().and_then(track);
         frames.acquire(|frame| {
             frame.instant = instant;
             frame.time = simulation.time_of(instant);
             frame.samples.clear();
             frame.samples.extend_from_slice(simulation.samples());
+            frame.program = place;
             frame.feed_rate = simulation.feed_rate();
             frame.resets = *resets;
             frame.motions.clone_from(motions);
@@ -97,6 +106,7 @@ impl Axes {
             let unread = Arc::clone(&self.stream_ends);
             let _ = self.reports.send(SimulationReport::StreamEnded(now, end, joints, unread));
         }
+        let period = self.simulation.period();
         for end in self.simulation.drain_finished() {
             self.motions.retain(|(id, _)| *id != end.id);
             let count = self.stops.len();
@@ -104,8 +114,13 @@ impl Axes {
             if self.stops.len() < count {
                 continue;
             }
+            let program = self.program.take_if(|program| program.motion == end.id);
+            let report = match program {
+                Some(program) => SimulationReport::ProgramEnded(end, program.finish(period)),
+                None => SimulationReport::MotionEnded(end),
+            };
             // The receiver is dropped only at shutdown.
-            let _ = self.reports.send(SimulationReport::MotionEnded(end));
+            let _ = self.reports.send(report);
         }
     }
 
@@ -136,7 +151,7 @@ impl Axes {
 
     /// Applies a command; it takes effect in the next step.
     pub(super) fn apply(&mut self, command: Command) {
-        let Axes { simulation, reports, stream, resets, motions, stops, .. } = self;
+        let Axes { simulation, reports, stream, resets, motions, stops, program, .. } = self;
         // Between two instants, the current time is the time of the first.
         let now = simulation.time_of(simulation.next_instant() - 1);
         match command {
@@ -153,6 +168,24 @@ impl Axes {
                     motions.push((id, accepted.start));
                 }
                 let _ = reports.send(SimulationReport::Decision(id, now, decision));
+            }
+            Command::BeginMotion { id, linear, rest } => {
+                *program = Some(ProgramMonitor::new(id, linear));
+                let positions = simulation.begin_motion(id);
+                motions.push((id, now));
+                let accepted = Accepted { start: now, is_late: false };
+                let _ = reports.send(SimulationReport::Decision(id, now, Ok(accepted)));
+                // Its planning ends with the node.
+                let _ = rest.send(positions);
+            }
+            Command::ExtendMotion { id, chunk } => {
+                if let Err(rejection) = simulation.extend_motion(id, chunk) {
+                    warn!("part program canceled, its planned motion is not continuous: {rejection}");
+                    simulation.cancel(id);
+                }
+            }
+            Command::FinishMotion(id) => {
+                simulation.finish_motion(id);
             }
             Command::Stop(id, trajectory) => match simulation.submit(id, trajectory) {
                 Ok(_) => stops.push(id),

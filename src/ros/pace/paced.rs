@@ -69,7 +69,9 @@ pub(super) async fn run(
         } else if ticks_at.is_none() {
             ticks_at = Some(idle_timer.next_tick(tick));
         }
-        let may_step = condition == StepCondition::Immediate;
+        // A part program is planned in another thread: its setpoints do not depend on the time that this takes.
+        let is_planned = !axes.axes.simulation().needs_chunk();
+        let may_step = condition == StepCondition::Immediate && is_planned;
         let mut permit = None;
         if may_step {
             permit = frames.try_reserve().ok();
@@ -86,7 +88,7 @@ pub(super) async fn run(
                 () = until(ticks_at), if ticks_at.is_some() => {
                     ticks_at = None;
                     // An idle machine does not wait for space in the queue; it tries again at the next tick.
-                    permit = frames.try_reserve().ok();
+                    permit = frames.try_reserve().ok().filter(|_| is_planned);
                 }
                 reserved = frames.reserve(), if may_step => match reserved {
                     Ok(reserved) => permit = Some(reserved),
@@ -130,16 +132,22 @@ impl PacedAxes {
             return;
         }
         match command {
-            Command::Submit { id, .. } if self.waiting.len() >= COMMAND_QUEUE => {
+            Command::Submit { id, .. } | Command::BeginMotion { id, .. }
+                if self.waiting.len() >= COMMAND_QUEUE =>
+            {
                 self.axes.reject_queue_full(id);
             }
-            Command::Submit { .. } => self.waiting.push_back(command),
+            Command::Submit { .. } | Command::BeginMotion { .. } => self.waiting.push_back(command),
             // Loads and streamed setpoints are valid only at their reception.
             Command::Load { .. } | Command::Stream(_) => {}
             Command::Cancel(id, _) => {
                 // A motion must be submitted before it can be canceled; other commands continue to wait.
-                let is_canceled =
-                    |waiting: &Command| matches!(waiting, Command::Submit { id: other, .. } if *other == id);
+                let is_canceled = |waiting: &Command| match waiting {
+                    Command::Submit { id: other, .. } | Command::BeginMotion { id: other, .. } => {
+                        *other == id
+                    }
+                    _ => false,
+                };
                 if let Some(submission) =
                     self.waiting.iter().position(is_canceled).and_then(|index| self.waiting.remove(index))
                 {
@@ -157,6 +165,8 @@ impl PacedAxes {
                 self.axes.apply(command);
                 self.axes.report_ends();
             }
+            // Of a motion that has not begun.
+            Command::ExtendMotion { .. } | Command::FinishMotion(_) => {}
             Command::SetFeedOverride(_)
             | Command::SetFeedHold(_)
             | Command::UpdateParameters(_)

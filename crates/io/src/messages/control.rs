@@ -147,11 +147,11 @@ pub struct SpeedScalingFactor {
 
 /// Request of the service `_action/send_goal`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct SendGoalRequest {
+pub struct SendGoalRequest<G = FollowJointTrajectoryGoal> {
     /// Goal id chosen by the client.
     pub goal_id: UUID,
     /// Goal.
-    pub goal: FollowJointTrajectoryGoal,
+    pub goal: G,
 }
 
 /// Response of the service `_action/send_goal`.
@@ -172,18 +172,18 @@ pub struct GetResultRequest {
 
 /// Response of the service `_action/get_result`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct GetResultResponse {
+pub struct GetResultResponse<R = FollowJointTrajectoryResult> {
     /// Status code of `action_msgs/GoalStatus`.
     pub status: i8,
     /// Result.
-    pub result: FollowJointTrajectoryResult,
+    pub result: R,
 }
 
 /// Message of the topic `_action/feedback`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct FeedbackMessage {
+pub struct FeedbackMessage<F = FollowJointTrajectoryFeedback> {
     /// Id of the goal.
     pub goal_id: UUID,
     /// Feedback.
-    pub feedback: FollowJointTrajectoryFeedback,
+    pub feedback: F,
 }

@@ -3,6 +3,7 @@
 mod control;
 mod own;
 mod pose;
+mod program;
 mod recorded;
 mod request_seed;
 mod schema;
@@ -17,6 +18,7 @@ pub use control::{
 };
 pub use own::{DriveStates, MotorCurrents, PACKAGE, Source, Status, TrajectoryResult};
 pub use pose::{path, pose_stamped};
+pub use program::{ProgramErrorCode, RunProgramFeedback, RunProgramGoal, RunProgramResult};
 pub use recorded::Recorded;
 pub use request_seed::RequestSeed;
 pub use ros2_interfaces_jazzy_serde::{

@@ -78,6 +78,8 @@ pub enum Source {
     Action = 1,
     /// Topic `psec_stream`.
     Stream = 2,
+    /// Action `~/run_program`.
+    Program = 3,
 }
 
 /// Status of a trajectory: the constants `ACCEPTED` … `ABORTED` of `msg/TrajectoryResult.msg`.

@@ -76,6 +76,19 @@ impl InterpreterOptions {
         options.kinematics = Some(transform);
         options
     }
+
+    /// Sets the axis positions at the program start to `joints`, m and rad, in the order of the machine of
+    /// [`for_machine`](Self::for_machine).
+    #[must_use]
+    pub fn starting_at(mut self, joints: &[f64]) -> Self {
+        let axes = self.kinematics.iter().flat_map(|transform| &transform.joints);
+        for (axis, position) in axes.zip(joints) {
+            if let Some(axis) = axis {
+                self.start[*axis] = *position;
+            }
+        }
+        self
+    }
 }
 
 /// Transformation between axis positions and the tool tip as fixed to the workpiece.

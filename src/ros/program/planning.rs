@@ -1,0 +1,150 @@
+//! Thread that interprets and plans a part program while it runs.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use tokio::runtime::Handle;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
+
+use super::source::ProgramText;
+use crate::ros::axes_interface::Command;
+use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::trajectory::{JointLimits, KinematicState, MotionChunk, MotionId, PathPlace};
+use virtual_axes_core::units::seconds;
+use virtual_axes_nc::StartLine;
+use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions};
+use virtual_axes_nc::plan::{FeedPlanError, PartProgramPlanner, PlanOptions, PlannedChunk};
+
+/// Number of chunks in the timeline.
+const CHUNKS: usize = 8;
+/// Shortest chunk, s.
+const MIN_CHUNK: f64 = 0.1;
+
+/// State of a part program, shared by its goal and its planning.
+#[derive(Debug)]
+pub(super) struct ProgramState {
+    /// Permits for chunks in the timeline; closed at the end of the motion.
+    chunks: Arc<Semaphore>,
+    outcome: Mutex<PlanOutcome>,
+}
+
+/// Outcome of the planning so far.
+#[derive(Debug, Clone, Default)]
+pub(super) struct PlanOutcome {
+    /// Error of the program.
+    pub error: Option<String>,
+    /// Duration of the planned motions at their programmed feed, s.
+    pub programmed_time: f64,
+}
+
+impl ProgramState {
+    pub(super) fn new() -> Self {
+        Self { chunks: Arc::new(Semaphore::new(CHUNKS)), outcome: Mutex::default() }
+    }
+
+    /// Ends the planning and returns its outcome.
+    pub(super) fn finish(&self) -> PlanOutcome {
+        self.chunks.close();
+        self.outcome.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn update(&self, change: impl FnOnce(&mut PlanOutcome)) {
+        change(&mut self.outcome.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+}
+
+/// Chunk with its permit, which is returned when the timeline has passed the chunk.
+#[derive(Debug)]
+struct PermittedChunk {
+    chunk: PlannedChunk,
+    _permit: OwnedSemaphorePermit,
+}
+
+impl MotionChunk for PermittedChunk {
+    fn cycles(&self) -> i64 {
+        self.chunk.cycles()
+    }
+
+    fn positions(&self, time: f64, joints: &mut [f64]) {
+        self.chunk.positions(time, joints);
+    }
+
+    fn state(&self, joint: usize, time: f64) -> KinematicState {
+        self.chunk.state(joint, time)
+    }
+
+    fn place(&self, time: f64) -> PathPlace {
+        self.chunk.place(time)
+    }
+}
+
+/// Part program to be planned.
+pub(super) struct Planning {
+    pub(super) motion: MotionId,
+    pub(super) source: ProgramText,
+    pub(super) start_line: usize,
+    pub(super) machine: Arc<MachineConfig>,
+    pub(super) state: Arc<ProgramState>,
+    pub(super) commands: mpsc::Sender<Command>,
+    /// Receiver of the positions at which the motion begins, m or rad.
+    pub(super) rest: oneshot::Receiver<Vec<f64>>,
+}
+
+impl Planning {
+    /// Plans the program until its end, its first error or the end of its motion. Blocks while enough is planned ahead.
+    pub(super) fn run(self, runtime: &Handle) {
+        let (commands, motion, state) = (self.commands.clone(), self.motion, Arc::clone(&self.state));
+        let command = match self.plan(runtime) {
+            Ok(()) => Command::FinishMotion(motion),
+            Err(error) => {
+                state.update(|outcome| outcome.error = Some(error));
+                // The end of the motion reports the error.
+                Command::Cancel(motion, oneshot::channel().0)
+            }
+        };
+        // The channel is closed only at shutdown.
+        let _ = commands.blocking_send(command);
+    }
+
+    fn plan(self, runtime: &Handle) -> Result<(), String> {
+        let Planning { motion, source, start_line, machine, state, commands, rest } = self;
+        let ProgramText { name, reader } = source;
+        // The sender is dropped if the motion is canceled before its start, or at shutdown.
+        let Ok(rest) = rest.blocking_recv() else { return Ok(()) };
+        let options = InterpreterOptions::for_machine(&machine).starting_at(&rest);
+        let start = options.start;
+        let steps = StartLine::new(Interpreter::new(reader, &name, options), start_line, start);
+        let named = |error: FeedPlanError| match error {
+            // The interpreter's error names the file.
+            FeedPlanError::Step(error) if error.is::<virtual_axes_nc::interpret::ProgramError>() => {
+                error.to_string()
+            }
+            error => format!("{name}: {error}"),
+        };
+        let mut planner = PartProgramPlanner::new(steps, &machine, PlanOptions::default()).map_err(named)?;
+        let cycles = chunk_cycles(&machine);
+        loop {
+            // Closed at the end of the motion.
+            let Ok(permit) = runtime.block_on(Arc::clone(&state.chunks).acquire_owned()) else {
+                return Ok(());
+            };
+            let chunk = planner.next_chunk(cycles).map_err(named)?;
+            state.update(|outcome| outcome.programmed_time = planner.programmed_time());
+            let Some(chunk) = chunk else { return Ok(()) };
+            let chunk = Arc::new(PermittedChunk { chunk, _permit: permit });
+            if commands.blocking_send(Command::ExtendMotion { id: motion, chunk }).is_err() {
+                return Ok(());
+            }
+        }
+    }
+}
+
+/// Returns the length of a chunk, position cycles: the longest time in which an axis stops.
+fn chunk_cycles(machine: &MachineConfig) -> u32 {
+    let stopping_time = |limits: JointLimits| {
+        let limits = limits.limits;
+        limits.velocity / limits.acceleration + limits.acceleration / limits.jerk
+    };
+    let times = machine.axes().iter().map(|axis| stopping_time(JointLimits::from_axis(axis)));
+    let longest = times.fold(MIN_CHUNK, f64::max);
+    (longest / seconds(machine.periods().position)).ceil().clamp(1.0, 1e6) as u32
+}

@@ -1,0 +1,274 @@
+"""Action ~/run_program: part programs in the node."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from action_msgs.msg import GoalStatus
+from control_msgs.action import FollowJointTrajectory
+from virtual_axes.action import RunProgram
+from virtual_axes.msg import TrajectoryResult as R
+
+from action import Follow, ending, goal, line, results_of
+from drive import NANOSECONDS, TSP_NS, Drive, Node, joint_trajectory, to_ns
+from drive.process import resident_mb
+from motion import TSP, go_home
+from test_feed_override import Feed
+
+ROOT = Path(__file__).parents[1]
+Goal, Result = RunProgram.Goal, RunProgram.Result
+
+SQUARE = """G21 G90 G54 G61.1
+G0 X10 Y0
+G1 X30 F3000
+Y20
+X10
+Y0
+M2
+"""
+"""Square with exact stops; line 3 is its first side."""
+LIMITS = {"x": (2.5, 50.0), "y": (3.0, 50.0)}
+"""Acceleration and jerk limits of the default machine, m/s² and m/s³."""
+LONG = "G21 G90 G64 P0.05\n" + "O1 repeat [100000]\nG1 X20 F1500\nY20\nX0\nY0\nO1 endrepeat\nM2\n"
+"""Program of more than 80 hours."""
+
+
+@pytest.fixture(scope="module")
+def programs() -> Iterator[Follow]:
+    args = ["-p", "time:=fast", "-p", "action_monitor_rate:=50.0"]
+    with Node(args) as process, Drive(process=process) as drive:
+        with Follow(drive, f"{drive.target}/run_program", kind=RunProgram) as follow:
+            yield follow
+
+
+@pytest.fixture(autouse=True)
+def at_home(programs: Follow) -> None:
+    go_home(programs.drive)
+
+
+def states_of(follow: Follow, sent) -> object:
+    """Returns the drive states from before the start of a program to its end."""
+    drive = follow.drive
+    ended = ending(follow, sent)
+    accepted = next(result for result in results_of(follow, sent) if result.status == R.ACCEPTED)
+    end = to_ns(ended.header.stamp)
+    drive.wait_until(end, 20)
+    return drive.record(to_ns(accepted.start), end).states
+
+
+def assert_within_limits(states, joints: str = "xy") -> None:
+    for joint in joints:
+        psec = states["psec", joint]
+        acceleration, jerk = LIMITS[joint]
+        assert np.abs(np.diff(psec, 2)).max() / TSP**2 <= acceleration * (1 + 1e-6)
+        assert np.abs(np.diff(psec, 3)).max() / TSP**3 <= jerk * (1 + 1e-6)
+
+
+def test_a_program_runs_to_its_end_with_feedback_and_figures(programs: Follow) -> None:
+    sent = programs.send(Goal(program=SQUARE))
+    ended = sent.ended(60)
+    assert ended.status == GoalStatus.STATUS_SUCCEEDED, ended.result
+    result = ended.result
+    assert (result.error_code, result.error_string) == (Result.SUCCESSFUL, "")
+    states = states_of(programs, sent)
+    assert_within_limits(states)
+    x, y = states["psec", "x"], states["psec", "y"]
+    # G54 is the origin of the workpiece frame: the program moves relative to it.
+    assert x.max() - x[-1] == pytest.approx(0.02, abs=1e-12)
+    assert y.max() - y[-1] == pytest.approx(0.02, abs=1e-12)
+    # Four sides of 20 mm at 3 m/min.
+    assert result.programmed_time == pytest.approx(1.6, rel=1e-9)
+    moving = np.flatnonzero(np.diff(np.column_stack([x, y]), axis=0).any(axis=1))
+    duration = (moving[-1] - moving[0] + 1) * TSP
+    assert result.cycle_time == pytest.approx(duration, abs=2.5 * TSP)
+    assert len(result.name) == len(result.max_tracking_error) == 5
+    error = states["synchronized_tracking_error"]
+    assert max(result.max_tracking_error) == pytest.approx(np.abs(error).max(), rel=1e-12)
+    assert 0 < result.rms_contour_error < result.max_contour_error < 1e-3
+    assert list(result.worst_tracking_error) == sorted(result.worst_tracking_error, reverse=True)
+    assert set(result.worst_line) == {2, 3, 4, 5, 6}
+    lines = [feedback.line for feedback in sent.feedback]
+    assert lines == sorted(lines) and set(lines) >= {3, 4, 5, 6}
+    fastest = max(feedback.feed for feedback in sent.feedback if feedback.line == 3)
+    assert 0.02 < fastest <= 0.05 * (1 + 1e-9)
+    assert {f.programmed_feed for f in sent.feedback if f.line == 3} == {0.05}
+    statuses = [result.status for result in results_of(programs, sent)]
+    assert statuses == [R.ACCEPTED, R.COMPLETED]
+    assert {result.source for result in results_of(programs, sent)} == {R.SOURCE_PROGRAM}
+
+
+def test_a_file_has_the_setpoints_of_the_command(programs: Follow, tmp_path: Path) -> None:
+    """The setpoints equal those of `virtual_axes psec` within the rounding of the time."""
+    path = tmp_path / "square.nc"
+    path.write_text(SQUARE)
+    sent = programs.send(Goal(path=str(path)))
+    assert sent.ended(60).status == GoalStatus.STATUS_SUCCEEDED
+    states = states_of(programs, sent)
+    out = tmp_path / "square.csv"
+    command = [ROOT / "target/release/virtual_axes", "psec", path, "--out", out]
+    subprocess.run(command, check=True, timeout=60, capture_output=True)
+    rows = np.genfromtxt(out, delimiter=",", names=True)
+    planned = np.column_stack([rows[joint] for joint in "xyz"])
+    found = np.column_stack([states["psec", joint] for joint in "xyz"])
+    first = np.flatnonzero(np.diff(found, axis=0).any(axis=1))[0]
+    begin = np.flatnonzero(np.diff(planned, axis=0).any(axis=1))[0]
+    count = min(len(found) - first, len(planned) - begin)
+    assert count > 300
+    assert np.abs(found[first : first + count] - planned[begin : begin + count]).max() < 1e-12
+
+
+def test_a_start_line_skips_earlier_motions(programs: Follow) -> None:
+    sent = programs.send(Goal(program=SQUARE, start_line=5))
+    result = sent.ended(60).result
+    assert result.error_code == Result.SUCCESSFUL, result.error_string
+    assert result.programmed_time == pytest.approx(0.8, rel=1e-9)
+    assert set(result.worst_line) == {5, 6}
+
+
+def test_the_feed_override_of_a_goal_and_a_feed_hold(programs: Follow) -> None:
+    drive = programs.drive
+    feed = Feed(drive)
+    sent = programs.send(Goal(program=SQUARE, feed_override=0.5))
+    sent.wait_for_feedback()
+    feed.call("feed_hold")
+    feed.wait_for_rate(0.0)
+    held = drive.latest("psec")
+    drive.wait_until(drive.now() + 50 * TSP_NS, 20)
+    assert drive.latest("psec") == held
+    feed.call("cycle_start")
+    ended = sent.ended(60)
+    assert ended.status == GoalStatus.STATUS_SUCCEEDED
+    states = states_of(programs, sent)
+    assert_within_limits(states)
+    feed.publish(1.0)
+    again = programs.send(Goal(program=SQUARE))
+    assert 1.5 * again.ended(60).result.cycle_time < ended.result.cycle_time
+    assert max(f.feed for f in sent.feedback if f.line > 2) <= 0.025 * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    "message, code, text",
+    [
+        (Goal(), Result.INVALID_GOAL, "the goal has no program: set path or program"),
+        (Goal(path="a", program="b"), Result.INVALID_GOAL, "the goal has path and program: set one of them"),
+        (
+            Goal(program="M2", feed_override=-1.0),
+            Result.INVALID_GOAL,
+            "feed override -1 must be a number from 0 to 2 (200 %)",
+        ),
+        (Goal(path="/no/such.nc"), Result.FILE_ERROR, "/no/such.nc: No such file or directory (os error 2)"),
+        (Goal(path="/dev/zero"), Result.FILE_ERROR, "/dev/zero: is not a regular file"),
+        (Goal(path="/"), Result.FILE_ERROR, "/: is not a regular file"),
+        (Goal(program="G1 X1 F100\nG41 X2\nM2\n"), Result.PROGRAM_ERROR, "program:2: G41 is not supported"),
+        (Goal(program="G1 X1 F100\nG1 X2000\nM2\n"), Result.PROGRAM_ERROR, "program: line 2: x is at"),
+        (
+            Goal(program="G1 X1 F100\n", start_line=9),
+            Result.PROGRAM_ERROR,
+            "program: start line 9 is after",
+        ),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_an_invalid_goal_is_aborted_with_one_line(programs: Follow, message: Goal, code: int, text: str) -> None:
+    ended = programs.send(message).ended(30)
+    assert (ended.status, ended.result.error_code) == (GoalStatus.STATUS_ABORTED, code), ended.result.error_string
+    assert ended.result.error_string.startswith(text) and "\n" not in ended.result.error_string
+
+
+def test_a_named_pipe_does_not_block(programs: Follow, tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.nc"
+    os.mkfifo(pipe)
+    ended = programs.send(Goal(path=str(pipe))).ended(10)
+    assert ended.result.error_string == f"{pipe}: is not a regular file"
+
+
+def test_a_canceled_program_stops_within_the_limits(programs: Follow) -> None:
+    sent = programs.send(Goal(program=LONG))
+    sent.wait_for_feedback(20)
+    assert sent.cancel().return_code == 0
+    ended = sent.ended(30)
+    assert (ended.status, ended.result.error_code) == (GoalStatus.STATUS_CANCELED, Result.SUCCESSFUL)
+    assert_within_limits(states_of(programs, sent))
+    assert programs.send(Goal(program=SQUARE)).status(60) == GoalStatus.STATUS_SUCCEEDED
+
+
+def test_a_trajectory_preempts_a_program(programs: Follow) -> None:
+    drive = programs.drive
+    sent = programs.send(Goal(program=LONG))
+    sent.wait_for_feedback(20)
+    # Without a point at time 0, it is approached from the commanded state.
+    trajectory = line(["x"], [0.01], 2.0)
+    trajectory.points = trajectory.points[1:]
+    number = drive.send(trajectory)
+    ended = sent.ended(30)
+    assert (ended.status, ended.result.error_code) == (GoalStatus.STATUS_ABORTED, Result.PREEMPTED)
+    assert ended.result.error_string == f"preempted by trajectory {number} of psec"
+    assert drive.end(number, 30).status == R.COMPLETED
+    psec = drive.latest("psec")
+    assert psec["x"] == 0.01
+    drive.wait_until(drive.now() + 20 * TSP_NS, 10)
+    assert drive.latest("psec") == psec
+
+
+def test_a_goal_preempts_a_program_and_a_program_a_goal(programs: Follow) -> None:
+    drive = programs.drive
+    with Follow(drive, kind=FollowJointTrajectory) as trajectories:
+        program = programs.send(Goal(program=LONG))
+        program.wait_for_feedback(20)
+        # Approached from the commanded state, and long enough to be active when the next program is submitted.
+        rest = [[0.0] * 2] * 2
+        trajectory = joint_trajectory(["x", "y"], [2.0, 60.0], [[0.01, 0.01], [0.05, 0.05]], rest, rest)
+        moving = trajectories.send(goal(trajectory))
+        assert program.result(30).error_code == Result.PREEMPTED
+        moving.wait_for_feedback(3)
+        square = programs.send(Goal(program=SQUARE))
+        assert "preempted by goal" in moving.result(30).error_string
+        assert square.status(60) == GoalStatus.STATUS_SUCCEEDED
+        assert_within_limits(states_of(programs, square))
+
+
+def test_the_stop_service_and_a_newer_program_end_a_program(programs: Follow) -> None:
+    first = programs.send(Goal(program=LONG))
+    first.wait_for_feedback(5)
+    second = programs.send(Goal(program=LONG))
+    assert first.result(30).error_code == Result.PREEMPTED
+    second.wait_for_feedback(5)
+    programs.drive.stop()
+    assert second.result(30).error_code == Result.STOPPED
+
+
+def test_a_long_program_needs_constant_memory() -> None:
+    """Memory after minutes of a program is that after its first seconds."""
+    # Without subscriptions at the rate of the position cycles, for which the middleware needs memory in waves.
+    with Node(["-p", "time:=fast"]) as process, Drive(process=process, listen=False) as drive:
+        with Follow(drive, f"{drive.target}/run_program", kind=RunProgram) as programs:
+            sent = programs.send(Goal(program=LONG))
+            begin = to_ns(sent.wait_for_feedback().header.stamp)
+            memory = []
+            for seconds in (30, 300):
+                until = begin + seconds * NANOSECONDS
+
+                def has_come(until: int = until) -> bool:
+                    return to_ns(sent.feedback[-1].header.stamp) >= until
+
+                drive.wait_for(has_come, 120, f"{seconds} s of the program")
+                memory.append(resident_mb(process.pid))
+            assert memory[1] - memory[0] < 8, memory
+            sent.cancel()
+            assert sent.status(30) == GoalStatus.STATUS_CANCELED
+
+
+def test_a_program_runs_in_real_time(start: Callable[..., Drive]) -> None:
+    """A chunk that is late stops the axes on the path, so that the setpoints keep their limits in any case."""
+    drive = start("-p", "time:=real")
+    with Follow(drive, f"{drive.target}/run_program", kind=RunProgram) as programs:
+        sent = programs.send(Goal(path=str(ROOT / "config/programs/circle-diamond-square.nc"), feed_override=2.0))
+        sent.wait_for_feedback(40, timeout=40)
+        sent.cancel()
+        assert sent.status(30) == GoalStatus.STATUS_CANCELED
+        assert_within_limits(states_of(programs, sent))
