@@ -35,6 +35,8 @@ const MAX_CYCLES: usize = 2000;
 const BISECTIONS: usize = 60;
 /// Distance from a step that counts as reached.
 const REACHED: f64 = 1e-12;
+/// Change of the step that is rounding.
+const ROUNDED_CHANGE: f64 = 1e-15;
 /// Cycles at a constant step after which all differences belong to it.
 const STEADY_CYCLES: u32 = 3;
 
@@ -246,9 +248,6 @@ impl FeedControl {
         if !is_changed {
             self.change = self.ramp.next(self.step, self.change);
         }
-        if self.change.abs() < 1e-15 {
-            self.change = 0.0;
-        }
         self.step = (self.step + self.change).clamp(0.0, self.fastest);
         self.step
     }
@@ -261,6 +260,8 @@ impl FeedControl {
             let wanted = self.wanted(goal, largest, ramp);
             for fraction in FRACTIONS {
                 let change = self.change + fraction * wanted;
+                // Here and not after the check: the course after a change of 0 is another one.
+                let change = if change.abs() < ROUNDED_CHANGE { 0.0 } else { change };
                 if self.is_allowed(change, ramp, allowance, motion) {
                     (self.ramp, self.change) = (ramp, change);
                     return true;

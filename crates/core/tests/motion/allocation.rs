@@ -117,6 +117,18 @@ fn motions_of_several_joints_with_tolerances_allocate_nothing() {
 }
 
 #[test]
+fn a_changing_feed_override_allocates_nothing() {
+    let mut fixture = SimulationFixture::new(NONE, 0);
+    let trajectory = wave(&fixture, TSP, 2);
+    fixture.simulation.submit(A, trajectory).expect("accepted");
+    let mut cycle = 0;
+    assert_nothing_allocated("feed override", &mut fixture.simulation, |simulation| {
+        cycle += 1;
+        simulation.set_feed_override([1.0, 0.3, 2.0, 0.0][cycle / 40 % 4]).expect("valid");
+    });
+}
+
+#[test]
 fn a_waiting_motion_allocates_nothing() {
     let mut fixture = SimulationFixture::new(NONE, 0);
     let later = fixture.ballbar(Start::At(10_000 * TSP));
