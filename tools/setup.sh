@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Creates the Python environment inside the checkout: .venv (rclpy and the message generators),
-# .build/install (the messages of this package, and the interfaces of control_msgs that the node uses)
+# Creates the Python environment inside the checkout: .venv (rclpy, the message generators and
+# the module virtual_axes_py built from crates/py), .build/install (the messages of this package, and the interfaces
+# of control_msgs that the node uses)
 # and .build/env.sh, which activates both in a shell.
 #
 #     tools/setup.sh [--browser] && source .build/env.sh
@@ -140,6 +141,15 @@ END
 from control_msgs.action import FollowJointTrajectory')
 }
 
+# Builds and installs the Python module of the simulation; `pip install .` does the same with a build environment.
+make_module() {
+  command -v cargo >/dev/null || fail "needs cargo, Rust's build tool (https://rustup.rs)"
+  rm -rf "$build/wheel"
+  PATH=$venv/bin:$PATH "$venv/bin/python" -m pip wheel --disable-pip-version-check --no-deps --no-build-isolation -w "$build/wheel" .
+  "$venv/bin/python" -m pip install --disable-pip-version-check --no-deps --force-reinstall "$build"/wheel/*.whl
+  (cd / && "$venv/bin/python" -c 'import virtual_axes_py; virtual_axes_py.Machine.load()')
+}
+
 # The path of the checkout is an input: a virtual environment cannot be moved.
 hash_of() {
   { printf '%s\0' "$root" "$@"; cat "$@"; } | sha256sum | cut -d' ' -f1
@@ -150,8 +160,11 @@ is_done() { # stamp file, hash
 }
 
 venv_hash=$(hash_of tools/setup.sh test_py/requirements.txt test_py/constraints.txt)
-messages_hash=$(hash_of tools/setup.sh test_py/requirements.txt test_py/constraints.txt package.xml CMakeLists.txt msg/*.msg \
+messages_hash=$(hash_of tools/setup.sh test_py/requirements.txt test_py/constraints.txt package.xml CMakeLists.txt msg/*.msg msg/action/*.action \
   "$overlay"/package.xml "$overlay"/CMakeLists.txt "$overlay"/*/*.msg "$overlay"/*/*.action)
+mapfile -t module_sources < <(find pyproject.toml Cargo.toml Cargo.lock crates -type f -not -path '*/tests/*' | LC_ALL=C sort)
+module_hash=$(hash_of tools/setup.sh test_py/requirements.txt test_py/constraints.txt "${module_sources[@]}")
+module_stamp=$build/module.stamp
 venv_stamp=$venv/setup.stamp
 messages_stamp=$build/messages.stamp
 
@@ -162,7 +175,7 @@ if command -v flock >/dev/null; then flock 8; fi
 
 if ! is_done "$venv_stamp" "$venv_hash" || ! "$venv/bin/python" -c '' 2>/dev/null; then
   check_tools
-  rm -f "$messages_stamp"
+  rm -f "$messages_stamp" "$module_stamp"
   step "Python packages into .venv" venv make_venv
   echo "$venv_hash" >"$venv_stamp"
 fi
@@ -171,5 +184,10 @@ if ! is_done "$messages_stamp" "$messages_hash"; then
   rm -f "$messages_stamp"
   step "messages into .build" messages make_messages
   echo "$messages_hash" >"$messages_stamp"
+fi
+if ! is_done "$module_stamp" "$module_hash"; then
+  rm -f "$module_stamp"
+  step "virtual_axes_py into .venv" module make_module
+  echo "$module_hash" >"$module_stamp"
 fi
 if $browser; then install_browser; install_network_tools; fi

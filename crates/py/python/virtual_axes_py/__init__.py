@@ -1,0 +1,55 @@
+"""Virtual machine-tool axes: feed drives of machine tools, simulated from Python.
+
+    import virtual_axes_py as va
+
+    machine = va.Machine.load()
+    run = machine.simulate(va.scenario("ballbar"))
+    print(run.figures["contour_error_um"]["max"])
+
+Lengths are in m, angles in rad, times in s, currents in A. Figures have the keys and units of
+`virtual_axes run --json`. The module needs NumPy only; pandas and matplotlib are imported where they are used.
+
+The ROS messages of the node are in the module `virtual_axes`, which ROS generates; both can be imported together.
+"""
+
+from __future__ import annotations
+
+from . import design
+from ._native import PartProgram, Scenario, machine_names, scenario_names
+from .machine import SIGNALS, Machine
+from .run import Run
+from .stepper import Stepper
+from .study import SweepResult, sweep
+
+__all__ = [
+    "SIGNALS",
+    "Machine",
+    "PartProgram",
+    "Run",
+    "Scenario",
+    "Stepper",
+    "SweepResult",
+    "design",
+    "machine_names",
+    "nc_program",
+    "scenario",
+    "scenario_names",
+    "sweep",
+]
+
+
+def scenario(name_or_path: str, feed: float | None = None) -> Scenario:
+    """Loads a built-in scenario (`scenario_names()`) or a scenario file.
+
+    `feed` replaces the feed of the scenario, m/min (rpm for a scenario of rotary moves). Raises `ValueError` with file,
+    line, key and value for an invalid scenario.
+    """
+    return Scenario.load(name_or_path, feed)
+
+
+def nc_program(path: str, feed_override: float = 1.0) -> PartProgram:
+    """Names a part program in G code; it is read and planned when it is simulated.
+
+    `feed_override` is above 0 and at most 2, 1 for the programmed feed. Raises `ValueError` for another one.
+    """
+    return PartProgram.load(path, feed_override)

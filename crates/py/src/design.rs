@@ -1,0 +1,149 @@
+//! Controller design: prediction model, RST controllers, poles and margins.
+
+use num_complex::Complex64;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use virtual_axes_core::config::AxisConfig;
+use virtual_axes_core::control::Rst as CoreRst;
+use virtual_axes_core::design::{
+    self, ControlWeight, GpcTuning, PidTuning, PolePlacement, PredictionModel as CoreModel,
+};
+use virtual_axes_core::machine::{design_controller, prediction_model};
+
+use crate::convert::value_error;
+use crate::machine::PyMachine;
+
+/// Discrete transfer function from Ω* to θ of an axis, `A(q⁻¹) θ = B(q⁻¹) Ω*`.
+#[pyclass(name = "PredictionModel", module = "virtual_axes_py._native", frozen)]
+pub struct PyPredictionModel {
+    model: CoreModel,
+}
+
+/// Position controller in RST form, `S Ω* = T θ* − R θ`.
+#[pyclass(name = "Rst", module = "virtual_axes_py._native", frozen)]
+pub struct PyRst {
+    rst: CoreRst,
+}
+
+#[pymethods]
+impl PyPredictionModel {
+    #[new]
+    fn new(a: Vec<f64>, b: Vec<f64>, period: f64) -> PyResult<Self> {
+        Ok(PyPredictionModel { model: CoreModel::new(a, b, period).map_err(value_error)? })
+    }
+
+    #[getter]
+    fn a(&self) -> Vec<f64> {
+        self.model.a().to_vec()
+    }
+
+    #[getter]
+    fn b(&self) -> Vec<f64> {
+        self.model.b().to_vec()
+    }
+
+    #[getter]
+    fn period(&self) -> f64 {
+        self.model.period()
+    }
+
+    #[pyo3(signature = (n1, n2, nu, weight, is_relative))]
+    fn gpc(&self, n1: usize, n2: usize, nu: usize, weight: f64, is_relative: bool) -> PyResult<PyRst> {
+        let weight =
+            if is_relative { ControlWeight::Relative(weight) } else { ControlWeight::Absolute(weight) };
+        let rst = design::gpc(&self.model, &GpcTuning { n1, n2, nu, weight }).map_err(value_error)?;
+        Ok(PyRst { rst })
+    }
+
+    fn pid(
+        &self,
+        gain: f64,
+        integral_time: f64,
+        derivative_time: f64,
+        filter_time: f64,
+        velocity_feedforward: f64,
+    ) -> PyResult<PyRst> {
+        let period = self.model.period();
+        let rst = if integral_time.is_infinite() && derivative_time == 0.0 {
+            design::p_controller(gain, velocity_feedforward, period)
+        } else {
+            let tuning =
+                PidTuning { gain, integral_time, derivative_time, filter_time, velocity_feedforward };
+            design::pid_controller(&tuning, period)
+        };
+        Ok(PyRst { rst: rst.map_err(value_error)? })
+    }
+
+    fn place_poles(
+        &self,
+        poles: Vec<Complex64>,
+        integrator: bool,
+        velocity_feedforward: f64,
+    ) -> PyResult<PyRst> {
+        let wanted = PolePlacement { poles, integrator, velocity_feedforward };
+        Ok(PyRst { rst: design::pole_placement(&self.model, &wanted).map_err(value_error)? })
+    }
+
+    fn margins<'py>(&self, py: Python<'py>, rst: &PyRst) -> PyResult<Bound<'py, PyDict>> {
+        let margins = py.detach(|| design::margins(&self.model, &rst.rst)).map_err(value_error)?;
+        let found = PyDict::new(py);
+        found.set_item("modulus", margins.modulus)?;
+        found.set_item("phase", margins.phase)?;
+        found.set_item("gain", margins.gain)?;
+        found.set_item("gain_reduction", margins.gain_reduction)?;
+        found.set_item("delay", margins.delay)?;
+        Ok(found)
+    }
+
+    fn poles(&self, rst: &PyRst) -> PyResult<Vec<Complex64>> {
+        design::poles(&self.model, &rst.rst).map_err(value_error)
+    }
+}
+
+#[pymethods]
+impl PyRst {
+    #[new]
+    fn new(r: Vec<f64>, s: Vec<f64>, t: Vec<f64>, t_first: i64) -> PyResult<Self> {
+        Ok(PyRst { rst: CoreRst::new(&r, &s, &t, t_first).map_err(value_error)? })
+    }
+
+    #[getter]
+    fn r(&self) -> Vec<f64> {
+        self.rst.r().to_vec()
+    }
+
+    #[getter]
+    fn s(&self) -> Vec<f64> {
+        self.rst.s().to_vec()
+    }
+
+    #[getter]
+    fn t(&self) -> Vec<f64> {
+        self.rst.t().to_vec()
+    }
+
+    #[getter]
+    fn t_first(&self) -> i64 {
+        self.rst.t_first()
+    }
+}
+
+fn axis_of<'m>(machine: &'m PyMachine, name: &str) -> PyResult<&'m AxisConfig> {
+    let axes = machine.config.axes();
+    axes.iter().find(|known| known.name() == name).ok_or_else(|| {
+        let names: Vec<&str> = axes.iter().map(|axis| axis.name()).collect();
+        value_error(format!("axis {name:?} is unknown; known are {}", names.join(", ")))
+    })
+}
+
+/// Computes the prediction model of an axis.
+pub fn model_of(machine: &PyMachine, axis: &str) -> PyResult<PyPredictionModel> {
+    let axis = axis_of(machine, axis)?;
+    Ok(PyPredictionModel { model: prediction_model(axis, &machine.config.periods()).map_err(value_error)? })
+}
+
+/// Designs the controller of an axis as configured.
+pub fn controller_of(machine: &PyMachine, axis: &str) -> PyResult<PyRst> {
+    let (axis, PyPredictionModel { model }) = (axis_of(machine, axis)?, model_of(machine, axis)?);
+    Ok(PyRst { rst: design_controller(axis, &model).map_err(value_error)? })
+}

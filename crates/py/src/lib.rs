@@ -1,0 +1,29 @@
+//! Native part of the Python package `virtual_axes_py`: machines, simulations, steppers and controller design.
+//!
+//! The package `python/virtual_axes_py` wraps these classes and documents them for users. All lengths are in m, angles in
+//! rad, times in s. Functions that take long release the global interpreter lock.
+
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
+
+mod convert;
+mod design;
+mod machine;
+mod setpoints;
+mod signals;
+mod simulate;
+mod stepper;
+mod sweep;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use super::design::{PyPredictionModel, PyRst};
+    #[pymodule_export]
+    use super::machine::{PyMachine, machine_names};
+    #[pymodule_export]
+    use super::setpoints::{PartProgram, PyScenario, scenario_names};
+    #[pymodule_export]
+    use super::stepper::{Stepper, StepperState};
+}

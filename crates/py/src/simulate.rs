@@ -1,0 +1,164 @@
+//! Complete runs: setpoints in, signals and figures out.
+
+use std::io;
+use std::sync::Arc;
+
+use numpy::PyReadonlyArray2;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use virtual_axes_core::path::Program;
+use virtual_axes_core::trial::{
+    self, GridRows, Measures, SetpointSource, Tick, Trial, TrialError, TrialOutcome,
+};
+use virtual_axes_io::files::figures_json;
+
+use crate::convert::{check_signals, value_error};
+use crate::machine::PyMachine;
+use crate::setpoints::{PartProgram, PyScenario, Rows};
+use crate::signals::SignalTable;
+
+/// Position cycles between two looks at signals.
+const CYCLES_PER_CHECK: u64 = 5_000;
+
+/// Returns the choice of figures by its name.
+pub fn measures(name: &str) -> PyResult<Measures> {
+    match name {
+        "all" => Ok(Measures::ALL),
+        "contour" => Ok(Measures::WITHOUT_CIRCLES),
+        "axes" => Ok(Measures::AXES),
+        other => Err(value_error(format!("figures {other:?}: must be \"all\", \"contour\" or \"axes\""))),
+    }
+}
+
+/// Setpoints of a run as given by the caller.
+#[derive(FromPyObject)]
+pub enum Given<'py> {
+    /// Rows × axes, m or rad.
+    #[pyo3(transparent)]
+    Array(PyReadonlyArray2<'py, f64>),
+    #[pyo3(transparent)]
+    Scenario(PyRef<'py, PyScenario>),
+    #[pyo3(transparent)]
+    PartProgram(PyRef<'py, PartProgram>),
+}
+
+/// Setpoints and, of a scenario, its path.
+pub struct Prepared {
+    pub rows: Rows,
+    pub program: Option<Arc<Program>>,
+}
+
+impl Given<'_> {
+    /// Plans or copies the setpoints.
+    pub fn prepare(&self, py: Python<'_>, machine: &PyMachine) -> PyResult<Prepared> {
+        match self {
+            Given::Array(array) => {
+                let (axes, columns) = (machine.config.axes().len(), array.as_array().ncols());
+                if columns != axes {
+                    let names: Vec<&str> = machine.config.axes().iter().map(|axis| axis.name()).collect();
+                    let needed =
+                        format!("psec has {columns} columns; it needs one per axis: {}", names.join(", "));
+                    return Err(PyValueError::new_err(needed));
+                }
+                if array.as_array().nrows() == 0 {
+                    return Err(PyValueError::new_err("psec has no setpoints; it needs at least one row"));
+                }
+                let values = array.as_array().iter().copied().collect();
+                Ok(Prepared { rows: Rows { joints: (0..axes).collect(), values }, program: None })
+            }
+            Given::Scenario(scenario) => {
+                let scenario: &PyScenario = scenario;
+                py.detach(|| {
+                    let program = scenario.program(machine)?;
+                    Ok(Prepared {
+                        rows: scenario.rows(machine, Arc::clone(&program))?,
+                        program: Some(program),
+                    })
+                })
+            }
+            Given::PartProgram(part) => {
+                let part: &PartProgram = part;
+                py.detach(|| Ok(Prepared { rows: part.rows(machine)?, program: None }))
+            }
+        }
+    }
+}
+
+/// Callback of a trial that ends it when a signal arrives.
+pub struct SignalCheck {
+    cycles: u64,
+    interrupt: Option<PyErr>,
+}
+
+impl SignalCheck {
+    pub fn new() -> Self {
+        SignalCheck { cycles: 0, interrupt: None }
+    }
+
+    pub fn cycle(&mut self) -> io::Result<()> {
+        self.cycles += 1;
+        if self.cycles.is_multiple_of(CYCLES_PER_CHECK)
+            && let Err(error) = check_signals()
+        {
+            self.interrupt = Some(error);
+            return Err(io::Error::other("interrupted"));
+        }
+        Ok(())
+    }
+
+    /// Returns the exception of a failed trial.
+    pub fn error(self, error: TrialError) -> PyErr {
+        self.interrupt.unwrap_or_else(|| PyValueError::new_err(error.to_string()))
+    }
+}
+
+fn run(
+    machine: &PyMachine,
+    prepared: &Prepared,
+    measures: Measures,
+    every_tick: bool,
+    table: &mut SignalTable,
+) -> PyResult<TrialOutcome> {
+    let trial = Trial {
+        machine: &machine.config,
+        program: prepared.program.clone(),
+        allow_nonzero_end_velocity: machine.parameters.node_config().allow_nonzero_velocity_at_trajectory_end,
+        record: false,
+        measures,
+    };
+    let rows = &prepared.rows;
+    let source = SetpointSource::Grid(Box::new(GridRows::new(&rows.joints, &rows.values)));
+    let mut signals = SignalCheck::new();
+    let callback = |tick: Tick<'_>| {
+        table.push(tick.time, tick.machine);
+        if tick.position_instant { signals.cycle() } else { Ok(()) }
+    };
+    let outcome = if every_tick {
+        trial::trace(&trial, source, callback)
+    } else {
+        trial::run(&trial, source, callback)
+    };
+    outcome.map_err(|error| signals.error(error))
+}
+
+/// Returns signals, figures as JSON and the number of setpoints.
+pub fn simulate<'py>(
+    py: Python<'py>,
+    machine: &PyMachine,
+    psec: &Given<'py>,
+    signals: &[String],
+    every_tick: bool,
+    figures: &str,
+) -> PyResult<(Bound<'py, PyDict>, String, usize)> {
+    let measures = measures(figures)?;
+    let mut table = SignalTable::new(signals).map_err(|name| {
+        let known = crate::signals::NAMES.join(", ");
+        value_error(format!("signal {name:?} is unknown; known are {known}"))
+    })?;
+    let prepared = psec.prepare(py, machine)?;
+    let outcome = py.detach(|| run(machine, &prepared, measures, every_tick, &mut table))?;
+    let json = serde_json::Value::Object(figures_json(&outcome.figures)).to_string();
+    let setpoints = prepared.rows.values.len() / prepared.rows.joints.len().max(1);
+    Ok((table.into_dict(py, machine.config.axes().len())?, json, setpoints))
+}

@@ -1,0 +1,218 @@
+//! Stepwise simulation: one position cycle at a time, of one machine or of several in SIMD lanes.
+
+use std::sync::Arc;
+
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use virtual_axes_core::machine::{AxisSample, Machine as CoreMachine, MachineParameters};
+use virtual_axes_core::units::seconds;
+
+use crate::convert::value_error;
+use crate::machine::PyMachine;
+
+/// Machines from which on a step releases the global interpreter lock.
+const RELEASING: usize = 16;
+
+/// Simulation of one or several equal machines, stepped by position cycles.
+#[pyclass(module = "virtual_axes_py._native")]
+pub struct Stepper {
+    machine: CoreMachine,
+    /// Axes of one machine.
+    axes: usize,
+    machines: usize,
+}
+
+/// State of a [`Stepper`] to return to.
+#[pyclass(module = "virtual_axes_py._native", frozen)]
+pub struct StepperState {
+    machine: CoreMachine,
+    axes: usize,
+}
+
+impl Stepper {
+    fn repeated(&self, machine: &PyMachine) -> PyResult<Arc<MachineParameters>> {
+        let copies = vec![Arc::clone(&machine.discretized); self.machines];
+        MachineParameters::concatenate(&copies)
+            .map(Arc::new)
+            .ok_or_else(|| value_error("a stepper needs at least one machine"))
+    }
+
+    /// Returns the values of an array with one value per axis of each machine.
+    fn values(&self, name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<f64>> {
+        let shape = array.shape();
+        let is_fitting = shape == [self.machines, self.axes] || (self.machines == 1 && shape == [self.axes]);
+        if !is_fitting {
+            let needed = match self.machines {
+                1 => format!("({},)", self.axes),
+                machines => format!("({machines}, {})", self.axes),
+            };
+            return Err(PyValueError::new_err(format!("{name} has the shape {shape:?}; it needs {needed}")));
+        }
+        let values: Vec<f64> = array.as_array().iter().copied().collect();
+        match values.iter().position(|value| !value.is_finite()) {
+            Some(index) => {
+                Err(value_error(format!("{name}: value {index} is {}; it must be finite", values[index])))
+            }
+            None => Ok(values),
+        }
+    }
+
+    /// Returns an array (axes) of one machine, (machines, axes) of several.
+    fn array<'py>(&self, py: Python<'py>, of: impl Fn(usize) -> f64) -> PyResult<Bound<'py, PyAny>> {
+        let array = PyArray1::from_iter(py, (0..self.machine.axis_count()).map(of));
+        if self.machines == 1 {
+            return Ok(array.into_any());
+        }
+        let array: Bound<'py, PyArray2<f64>> = array.reshape([self.machines, self.axes])?;
+        Ok(array.into_any())
+    }
+
+    fn of_samples<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&AxisSample) -> f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.array(py, |axis| of(self.machine.axis(axis).sample()))
+    }
+}
+
+#[pymethods]
+impl Stepper {
+    #[new]
+    #[pyo3(signature = (machine, machines = 1))]
+    fn new(machine: &PyMachine, machines: usize) -> PyResult<Self> {
+        const MOST: usize = 100_000;
+        if !(1..=MOST).contains(&machines) {
+            return Err(value_error(format!("machines {machines}: must be from 1 to {MOST}")));
+        }
+        let mut stepper = Stepper {
+            machine: CoreMachine::new(Arc::clone(&machine.discretized)),
+            axes: machine.config.axes().len(),
+            machines,
+        };
+        if machines > 1 {
+            stepper.machine = CoreMachine::new(stepper.repeated(machine)?);
+        }
+        Ok(stepper)
+    }
+
+    #[pyo3(signature = (psec, preview = None))]
+    fn step<'py>(
+        &mut self,
+        py: Python<'py>,
+        psec: PyReadonlyArrayDyn<'py, f64>,
+        preview: Option<PyReadonlyArrayDyn<'py, f64>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let psec = self.values("psec", &psec)?;
+        let preview = match &preview {
+            None => Vec::new(),
+            Some(array) => {
+                let axes = self.machine.axis_count();
+                let (shape, values) = (array.shape(), array.as_array());
+                let periods = shape.last().copied().unwrap_or(0);
+                if values.len() != axes * periods || values.iter().any(|value| !value.is_finite()) {
+                    let reason = format!(
+                        "preview has the shape {shape:?}; it needs finite values, the following setpoints of {axes} axes, \
+                         axis by axis"
+                    );
+                    return Err(value_error(reason));
+                }
+                values.iter().copied().collect()
+            }
+        };
+        let machine = &mut self.machine;
+        if self.machines >= RELEASING {
+            py.detach(|| machine.advance(&psec, &preview));
+        } else {
+            machine.advance(&psec, &preview);
+        }
+        self.position(py)
+    }
+
+    #[pyo3(signature = (position = None))]
+    fn reset(&mut self, position: Option<PyReadonlyArrayDyn<'_, f64>>) -> PyResult<()> {
+        let position = match &position {
+            Some(array) => self.values("position", array)?,
+            None => vec![0.0; self.machine.axis_count()],
+        };
+        self.machine.reset(&position);
+        Ok(())
+    }
+
+    fn set_load(&mut self, load: PyReadonlyArrayDyn<'_, f64>) -> PyResult<()> {
+        let loads = self.values("load", &load)?;
+        loads.into_iter().enumerate().for_each(|(axis, load)| self.machine.set_load(axis, load));
+        Ok(())
+    }
+
+    fn set_machine(&mut self, machine: &PyMachine) -> PyResult<()> {
+        let parameters = self.repeated(machine)?;
+        self.machine.update_parameters(parameters).map_err(value_error)
+    }
+
+    fn save(&self) -> StepperState {
+        StepperState { machine: self.machine.clone(), axes: self.axes }
+    }
+
+    fn restore(&mut self, state: &StepperState) -> PyResult<()> {
+        if state.machine.axis_count() != self.machine.axis_count() || state.axes != self.axes {
+            return Err(value_error("the state is that of another number of machines or axes"));
+        }
+        self.machine = state.machine.clone();
+        Ok(())
+    }
+
+    #[getter]
+    fn position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.array(py, |axis| self.machine.motion_at_end(axis)[0])
+    }
+
+    #[getter]
+    fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.array(py, |axis| self.machine.motion_at_end(axis)[1])
+    }
+
+    #[getter]
+    fn current<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.array(py, |axis| self.machine.motion_at_end(axis)[2])
+    }
+
+    #[getter]
+    fn peak_current<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.array(py, |axis| self.machine.activity(axis).peak_current)
+    }
+
+    #[getter]
+    fn following_error<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.of_samples(py, AxisSample::following_error)
+    }
+
+    #[getter]
+    fn velocity_setpoint<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.of_samples(py, |sample| sample.velocity_setpoint)
+    }
+
+    /// Positions at each tick of the last position cycle.
+    fn tick_positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (axes, ticks) = (self.machine.axis_count(), self.machine.ticks_per_period());
+        let mut positions = vec![0.0; axes * ticks];
+        positions.chunks_mut(ticks).enumerate().for_each(|(axis, row)| self.machine.positions(axis, row));
+        positions.into_pyarray(py).reshape([axes, ticks])
+    }
+
+    #[getter]
+    fn time(&self) -> f64 {
+        seconds(self.machine.time())
+    }
+
+    #[getter]
+    fn machines(&self) -> usize {
+        self.machines
+    }
+
+    #[getter]
+    fn preview_length(&self) -> usize {
+        self.machine.preview_length()
+    }
+}

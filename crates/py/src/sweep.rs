@@ -1,0 +1,148 @@
+//! Simulation of many variants of a machine on the same setpoints.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::trial::{self, Figures, GridRows, Measures, SetpointSource, Trial, TrialError};
+use virtual_axes_io::files::figures_json;
+
+use crate::convert::{check_signals, value_error};
+use crate::machine::PyMachine;
+use crate::simulate::{Given, Prepared, measures};
+
+/// Variants simulated as the lanes of one machine.
+const BATCH: usize = 32;
+
+/// Figures of a variant, or the reason why it cannot be simulated.
+type Outcome = Result<Figures, String>;
+
+struct Sweep<'a> {
+    base: &'a PyMachine,
+    prepared: &'a Prepared,
+    measures: Measures,
+    stopped: &'a AtomicBool,
+}
+
+impl Sweep<'_> {
+    fn trial<'t>(&self, machine: &'t MachineConfig) -> Trial<'t> {
+        let node = self.base.parameters.node_config();
+        Trial {
+            machine,
+            program: self.prepared.program.clone(),
+            allow_nonzero_end_velocity: node.allow_nonzero_velocity_at_trajectory_end,
+            record: false,
+            measures: self.measures,
+        }
+    }
+
+    fn setpoints(&self) -> SetpointSource<'_> {
+        let rows = &self.prepared.rows;
+        SetpointSource::Grid(Box::new(GridRows::new(&rows.joints, &rows.values)))
+    }
+
+    /// Returns the axes that differ in a batch that can run as lanes beside each other; `None` if a variant differs in
+    /// more than axes, or in delays.
+    fn own_axes(&self, batch: &[MachineConfig]) -> Option<Vec<usize>> {
+        let base = &self.base.config;
+        let is_alike = batch.iter().all(|variant| {
+            let pairs = variant.axes().iter().zip(base.axes());
+            variant.axes().len() == base.axes().len()
+                && variant.periods() == base.periods()
+                && variant.kinematics() == base.kinematics()
+                && pairs
+                    .into_iter()
+                    .all(|(axis, base)| axis.delays == base.delays && axis.limits == base.limits)
+        });
+        let differs =
+            |index: &usize| batch.iter().any(|variant| variant.axes()[*index] != base.axes()[*index]);
+        is_alike.then(|| (0..base.axes().len()).filter(differs).collect())
+    }
+
+    fn run(&self, batch: &[MachineConfig]) -> Vec<Outcome> {
+        let go_on = || {
+            let is_stopped = self.stopped.load(Ordering::Relaxed);
+            if is_stopped { Err(std::io::Error::other("interrupted")) } else { Ok(()) }
+        };
+        if let Some(own) = self.own_axes(batch).filter(|own| !own.is_empty()) {
+            let trial = self.trial(&self.base.config);
+            if let Ok(figures) = trial::run_variants(&trial, self.setpoints(), batch, &own, go_on) {
+                return figures.into_iter().map(Ok).collect();
+            }
+        }
+        let one = |machine: &MachineConfig| -> Result<Figures, TrialError> {
+            Ok(trial::run(&self.trial(machine), self.setpoints(), |_| go_on())?.figures)
+        };
+        batch.iter().map(|machine| one(machine).map_err(|error| error.to_string())).collect()
+    }
+}
+
+/// Figures as JSON, or the reason of a failure.
+pub type SweepRow = (Option<String>, Option<String>);
+
+fn collected(outcomes: Vec<Outcome>) -> Vec<SweepRow> {
+    let json = |figures: &Figures| serde_json::Value::Object(figures_json(figures)).to_string();
+    outcomes
+        .into_iter()
+        .map(|outcome| match outcome {
+            Ok(figures) => (Some(json(&figures)), None),
+            Err(reason) => (None, Some(reason)),
+        })
+        .collect()
+}
+
+/// Returns figures as JSON or the reason of a failure for each variant, a dictionary of parameters.
+pub fn sweep<'py>(
+    py: Python<'py>,
+    base: &PyMachine,
+    variants: &[Bound<'py, PyDict>],
+    psec: &Given<'py>,
+    figures: &str,
+    threads: usize,
+) -> PyResult<Vec<SweepRow>> {
+    let measures = measures(figures)?;
+    let prepared = psec.prepare(py, base)?;
+    let configs: Vec<Result<MachineConfig, String>> = variants
+        .iter()
+        .map(|changes| match base.changed(changes) {
+            Ok(machine) => Ok(Ok(machine.config)),
+            // A wrong type is a mistake of the caller; a value out of range is a result of the study.
+            Err(error) if error.is_instance_of::<pyo3::exceptions::PyValueError>(py) => {
+                Ok(Err(error.value(py).to_string()))
+            }
+            Err(error) => Err(error),
+        })
+        .collect::<PyResult<_>>()?;
+    let stopped = Arc::new(AtomicBool::new(false));
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
+    let outcomes = py.detach(|| {
+        let sweep = Sweep { base, prepared: &prepared, measures, stopped: &stopped };
+        let valid: Vec<MachineConfig> =
+            configs.iter().filter_map(|config| config.as_ref().ok().cloned()).collect();
+        let batches: Vec<&[MachineConfig]> = valid.chunks(BATCH).collect();
+        let mut found = Vec::with_capacity(valid.len());
+        for group in batches.chunks(4 * pool.current_num_threads()) {
+            found.extend(
+                pool.install(|| group.par_iter().flat_map_iter(|batch| sweep.run(batch)).collect::<Vec<_>>()),
+            );
+            check_signals()?;
+        }
+        let mut found = found.into_iter();
+        let of_variant = |config: &Result<MachineConfig, String>| match config {
+            Ok(_) => found.next().unwrap_or_else(|| Err("not simulated".to_owned())),
+            Err(reason) => Err(reason.clone()),
+        };
+        Ok::<_, PyErr>(configs.iter().map(of_variant).collect::<Vec<Outcome>>())
+    })?;
+    if outcomes.len() != variants.len() {
+        return Err(value_error("a variant has no result"));
+    }
+    Ok(collected(outcomes))
+}
