@@ -38,7 +38,7 @@ AT_A_TIME = 512
 DISCOVERY_S = 120
 RENEWAL_S = 180
 """Timeout of a renewal, s."""
-AFTER_S = 5
+AFTER_S = 20
 """Time after a renewal before memory is measured, s."""
 READ = "read"
 """Argument that makes this file the process that reads joint_states."""
