@@ -95,7 +95,7 @@ rust_checks() {
 python_tests() (
   # shellcheck source=/dev/null
   source "$root/.build/env.sh"
-  python -m pytest test_py -n 2 --dist loadscope --no-loadscope-reorder "$@"
+  python -m pytest test_py -n 2 --dist loadscope --no-loadscope-reorder --max-worker-restart 2 "$@"
 )
 
 stage "format" bash -c "cargo fmt --all --check && cargo fmt --check --manifest-path fuzz/Cargo.toml" || finish 1
