@@ -5,6 +5,7 @@
 
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
 
+mod contour;
 mod convert;
 mod design;
 mod machine;
@@ -18,6 +19,8 @@ use pyo3::prelude::*;
 
 #[pymodule]
 mod _native {
+    #[pymodule_export]
+    use super::contour::ContourTrackers;
     #[pymodule_export]
     use super::design::{PyPredictionModel, PyRst};
     #[pymodule_export]

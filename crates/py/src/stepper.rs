@@ -130,19 +130,41 @@ impl Stepper {
         self.position(py)
     }
 
-    #[pyo3(signature = (position = None))]
-    fn reset(&mut self, position: Option<PyReadonlyArrayDyn<'_, f64>>) -> PyResult<()> {
+    #[pyo3(signature = (position = None, only = None))]
+    fn reset(
+        &mut self,
+        position: Option<PyReadonlyArrayDyn<'_, f64>>,
+        only: Option<Vec<usize>>,
+    ) -> PyResult<()> {
         let position = match &position {
             Some(array) => self.values("position", array)?,
             None => vec![0.0; self.machine.axis_count()],
         };
-        self.machine.reset(&position);
+        let Some(only) = only else {
+            self.machine.reset(&position);
+            return Ok(());
+        };
+        if let Some(index) = only.iter().find(|&&index| index >= self.machines) {
+            return Err(value_error(format!("machine {index}: must be below {}", self.machines)));
+        }
+        for axis in only.into_iter().flat_map(|index| index * self.axes..(index + 1) * self.axes) {
+            self.machine.reset_axis(axis, position[axis]);
+        }
         Ok(())
     }
 
     fn set_load(&mut self, load: PyReadonlyArrayDyn<'_, f64>) -> PyResult<()> {
         let loads = self.values("load", &load)?;
         loads.into_iter().enumerate().for_each(|(axis, load)| self.machine.set_load(axis, load));
+        Ok(())
+    }
+
+    fn set_velocity_offset(&mut self, offset: PyReadonlyArrayDyn<'_, f64>) -> PyResult<()> {
+        let offsets = self.values("offset", &offset)?;
+        offsets
+            .into_iter()
+            .enumerate()
+            .for_each(|(axis, offset)| self.machine.set_velocity_offset(axis, offset));
         Ok(())
     }
 

@@ -117,6 +117,8 @@ impl AxisParameters {
 pub struct Axis {
     /// External load at the axis, N or N·m.
     load: f64,
+    /// Offset that is added to the output of the position controller, rad/s of the motor.
+    velocity_offset: f64,
     psec: SetpointHistory,
     position: PositionState,
     /// Inputs to the inner loops in the present position cycle.
@@ -146,6 +148,7 @@ impl Axis {
         };
         let mut axis = Axis {
             load: 0.0,
+            velocity_offset: 0.0,
             psec: SetpointHistory::new(position, p.ticks_per_position, p.setpoint_window()),
             position: PositionState::at_rest(angle),
             inputs: InnerLoopInputs::default(),
@@ -184,12 +187,16 @@ impl Axis {
         self.load = load;
     }
 
+    pub(super) fn set_velocity_offset(&mut self, offset: f64) {
+        self.velocity_offset = offset;
+    }
+
     /// Executes the position loop at the start of a position cycle: returns the inputs to the inner loops.
     ///
     /// `psec` is the setpoint of the cycle, `preview` contains the known setpoints after it.
     ///
     /// ```text
-    /// Ω* = clamp(position controller(PSEC delayed by α / r, θ), ±Ωmax)             (Prévost fig. 3, eq. 9)
+    /// Ω* = clamp(position controller(PSEC delayed by α / r, θ) + offset, ±Ωmax)    (Prévost fig. 3, eq. 9)
     /// VFFWS from PSEC delayed by β, TFFWS from PSEC delayed by γ, zero-order hold  (Prévost eqs. 6 to 8)
     /// ```
     pub(super) fn execute_position_loop(
@@ -217,7 +224,11 @@ impl Axis {
         let torque = hold(p.torque_delay, &|k| p.feedforward.torque(history, k));
         let feedforward = velocity.at(0.0);
         let setpoint = |j| history.at(k + j) * p.inverse_ratio;
-        let unlimited = p.position.update(&mut self.position, setpoint, motor.angle, feedforward);
+        let mut unlimited = p.position.update(&mut self.position, setpoint, motor.angle, feedforward);
+        // Adding 0 would change the sign of -0.
+        if self.velocity_offset != 0.0 {
+            unlimited += self.velocity_offset;
+        }
         // An unstable RST controller (allow_unstable) can overflow: the axis stops then.
         let finite = if unlimited.is_finite() { unlimited } else { 0.0 };
         let velocity_setpoint = finite.clamp(-p.max_speed, p.max_speed);

@@ -158,14 +158,20 @@ impl Machine {
 
     /// Resets the machine to rest at `positions` (m or rad, one per axis) and tick 0.
     pub fn reset(&mut self, positions: &[f64]) {
-        for (index, ((axis, p), &position)) in
-            self.axes.iter_mut().zip(&self.parameters.axes).zip(positions).enumerate()
-        {
-            let (at_rest, state) = Axis::at_rest(p, position);
-            *axis = at_rest;
-            self.bank.set_state(index, &state);
+        for (index, &position) in positions.iter().enumerate() {
+            self.reset_axis(index, position);
         }
         self.tick = 0;
+    }
+
+    /// Resets one axis to rest at `position`, m or rad; the tick and the other axes go on.
+    pub fn reset_axis(&mut self, index: usize, position: f64) {
+        let (Some(axis), Some(p)) = (self.axes.get_mut(index), self.parameters.axes.get(index)) else {
+            return;
+        };
+        let (at_rest, state) = Axis::at_rest(p, position);
+        *axis = at_rest;
+        self.bank.set_state(index, &state);
     }
 
     /// Sets the SIMD width of the following position cycles; the results are bit-identical.
@@ -247,6 +253,16 @@ impl Machine {
     pub fn set_load(&mut self, axis: usize, load: f64) {
         if let Some(axis) = self.axes.get_mut(axis) {
             axis.set_load(load);
+        }
+    }
+
+    /// Sets an offset that is added to the output of the position controller of one axis (rad/s of the motor, m/s of a
+    /// linear motor) from the next position cycle on; 0 after a reset.
+    ///
+    /// The controllers see the sum, within the speed limit, as the velocity setpoint Ω* that they have put out.
+    pub fn set_velocity_offset(&mut self, axis: usize, offset: f64) {
+        if let Some(axis) = self.axes.get_mut(axis) {
+            axis.set_velocity_offset(offset);
         }
     }
 

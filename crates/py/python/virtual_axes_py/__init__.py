@@ -16,10 +16,12 @@ from __future__ import annotations
 
 from . import design
 from ._native import PartProgram, Scenario, machine_names, scenario_names
+from .chunks import SweepResult
 from .machine import SIGNALS, Machine
 from .run import Run
+from .shards import merge
 from .stepper import Stepper
-from .study import SweepResult, sweep
+from .study import SweepResults, random_variants, sweep
 
 __all__ = [
     "SIGNALS",
@@ -29,9 +31,12 @@ __all__ = [
     "Scenario",
     "Stepper",
     "SweepResult",
+    "SweepResults",
     "design",
     "machine_names",
+    "merge",
     "nc_program",
+    "random_variants",
     "scenario",
     "scenario_names",
     "sweep",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -38,13 +40,26 @@ class Stepper:
         ahead = None if preview is None else np.asarray(preview, dtype=np.float64)
         return self._native.step(np.asarray(psec, dtype=np.float64), ahead)
 
-    def reset(self, position: ArrayLike | None = None) -> None:
-        """Puts the axes at rest at `position`, m or rad (default 0), at time 0."""
-        self._native.reset(None if position is None else np.asarray(position, dtype=np.float64))
+    def reset(self, position: ArrayLike | None = None, *, only: Sequence[int] | None = None) -> None:
+        """Puts the axes at rest at `position`, m or rad (default 0), at time 0.
+
+        `only` are the indices of the machines to reset, at their rows of `position`; the time goes on then. Raises
+        `ValueError` for an array of another shape or an index out of range.
+        """
+        given = None if position is None else np.asarray(position, dtype=np.float64)
+        self._native.reset(given, None if only is None else list(only))
 
     def set_load(self, load: ArrayLike) -> None:
         """Sets the external loads from the next cycle on, N or N·m, positive towards plus."""
         self._native.set_load(np.asarray(load, dtype=np.float64))
+
+    def set_velocity_offset(self, offset: ArrayLike) -> None:
+        """Sets offsets that are added to the outputs Ω* of the position controllers from the next cycle on.
+
+        They are in rad/s of the motor (m/s of a linear motor) and 0 after a reset. The controllers see the sum, within
+        the speed limit, as their last output.
+        """
+        self._native.set_velocity_offset(np.asarray(offset, dtype=np.float64))
 
     def set_machine(self, machine: Machine) -> None:
         """Changes gains, weights, delays or plant parameters and keeps the state (bumpless transfer).

@@ -1,31 +1,31 @@
-"""Sweeps: one motion on many variants of a machine."""
+"""Sweeps: one motion on many variants of a machine, on all processors, on a Dask cluster or as a job array."""
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, overload
 
+import numpy as np
+
+from . import chunks, shards
+from .chunks import Setup, SweepResult
 from .machine import Machine
 
 if TYPE_CHECKING:
     import pandas
+    from distributed import Client
 
     from .machine import Parameter, Setpoints
 
-
-@dataclass(frozen=True)
-class SweepResult:
-    """Result of one variant."""
-
-    changes: dict[str, Any]
-    """Changed parameters."""
-    figures: dict[str, Any] | None
-    """Figures with the keys of `virtual_axes run --json`; none if the variant failed."""
-    error: str | None
-    """Reason of a failure, as an invalid parameter or an unstable loop."""
+BATCH = 32
+"""Variants that run side by side as vector lanes."""
+CHUNK = 4096
+"""Most variants in a chunk."""
+SHARE = 0.02
+"""Overhead of a chunk as a part of its duration, which determines its size."""
 
 
 class SweepResults(Sequence[SweepResult]):
@@ -51,19 +51,90 @@ class SweepResults(Sequence[SweepResult]):
         """Returns a row per variant: parameters, figures as `axes.x.peak_current_a`, `error` (needs pandas)."""
         import pandas
 
-        rows = [{**one.changes, **_flat(one.figures or {}), "error": one.error} for one in self._results]
-        return pandas.DataFrame(rows)
+        return pandas.DataFrame([one.row() for one in self._results])
 
 
-def _flat(figures: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Returns nested figures with joined keys, without lists."""
-    found: dict[str, Any] = {}
-    for key, value in figures.items():
-        if isinstance(value, Mapping):
-            found.update(_flat(value, f"{prefix}{key}."))
-        elif not isinstance(value, list):
-            found[f"{prefix}{key}"] = value
-    return found
+@dataclass(frozen=True)
+class RandomVariants(Sequence[Mapping[str, "Parameter"]]):
+    """Uniformly drawn variants that are computed when they are read."""
+
+    seed: int
+    """Seed of the draws."""
+    bounds: dict[str, tuple[float, float]]
+    """Lowest and highest value of each parameter."""
+    first: int
+    """Index of the first variant."""
+    end: int
+    """Index after the last variant."""
+
+    def __len__(self) -> int:
+        """Returns the number of variants."""
+        return self.end - self.first
+
+    def __getitem__(self, index: Any) -> Any:
+        """Returns the changed parameters of one variant, or the variants of a slice."""
+        if isinstance(index, slice):
+            first, end, step = index.indices(len(self))
+            if step != 1:
+                return [self[one] for one in range(first, end, step)]
+            return RandomVariants(self.seed, self.bounds, self.first + first, self.first + max(first, end))
+        position = range(self.first, self.end)[index]
+        random = np.random.default_rng([self.seed, position])
+
+        def draw(low: float, high: float) -> float:
+            if isinstance(low, int) and isinstance(high, int):
+                return int(random.integers(low, high, endpoint=True))
+            return float(random.uniform(low, high))
+
+        return {name: draw(*bounds) for name, bounds in self.bounds.items()}
+
+
+def random_variants(seed: int, n: int, bounds: Mapping[str, tuple[float, float]]) -> RandomVariants:
+    """Returns n variants with uniformly drawn parameters.
+
+    `bounds` are the lowest and highest value of each parameter; two integers draw integers. Variant i depends on
+    `seed`, `bounds` and i only. Raises `ValueError` for a negative seed or number, or bounds in the wrong order.
+    """
+    if seed < 0 or n < 0:
+        raise ValueError(f"seed {seed}, n {n}: must be at least 0")
+    for name, (low, high) in bounds.items():
+        if not (np.isfinite([low, high]).all() and low <= high):
+            raise ValueError(f"{name}: bounds ({low}, {high}) must be finite, the lower one first")
+    return RandomVariants(seed, {name: (low, high) for name, (low, high) in bounds.items()}, 0, n)
+
+
+@overload
+def sweep(
+    machine: Machine,
+    variants: Sequence[Mapping[str, Parameter]],
+    psec: Setpoints,
+    *,
+    figures: str = ...,
+    threads: int | None = ...,
+    executor: Client | None = ...,
+    chunk: int | None = ...,
+    out: None = ...,
+    resume: bool = ...,
+    shard: tuple[int, int] | None = ...,
+    progress: bool | None = ...,
+) -> SweepResults: ...
+
+
+@overload
+def sweep(
+    machine: Machine,
+    variants: Sequence[Mapping[str, Parameter]],
+    psec: Setpoints,
+    *,
+    out: str | Path,
+    figures: str = ...,
+    threads: int | None = ...,
+    executor: Client | None = ...,
+    chunk: int | None = ...,
+    resume: bool = ...,
+    shard: tuple[int, int] | None = ...,
+    progress: bool | None = ...,
+) -> Path: ...
 
 
 def sweep(
@@ -73,23 +144,80 @@ def sweep(
     *,
     figures: str = "axes",
     threads: int | None = None,
-) -> SweepResults:
+    executor: Client | None = None,
+    chunk: int | None = None,
+    out: str | Path | None = None,
+    resume: bool = False,
+    shard: tuple[int, int] | None = None,
+    progress: bool | None = None,
+) -> SweepResults | Path:
     """Simulates the same setpoints on each variant of a machine and returns their figures, in order.
 
-    `variants` are dictionaries of changed parameters, as for `Machine.with_`. `psec` and `figures` are those of
-    `Machine.simulate`. Variants with equal delays run side by side as vector lanes, on all processors or `threads` of
-    them; the result does not depend on either. A variant that cannot be simulated has an `error` in place of figures.
+    `variants` are dictionaries of changed parameters, as for `Machine.with_`, or `random_variants`. `psec` and
+    `figures` are those of `Machine.simulate`. Variants with equal delays run side by side, on all processors or
+    `threads` of them. A variant that cannot be simulated has an `error` in place of figures.
 
-    Raises `TypeError` for a parameter of another kind, `ValueError` for invalid setpoints.
+    `executor` is a Dask `Client` (extra `dask`): its workers simulate chunks of variants, each with 1 thread or
+    `threads`. A chunk of a lost worker is simulated again. `chunk` is the number of variants in a chunk; by default the
+    overhead of a chunk is measured and kept at 2 % of its duration. The results depend on none of these.
+
+    `out` is a directory (extra `parquet`): each chunk becomes a Parquet file there, and the directory is returned, for
+    `merge`. With `resume` the chunks in the directory are kept, if machine, motion, variants and figures are equal.
+    `shard=(i, n)` simulates the chunks with an index of i modulo n only, for job i of an array of n jobs with one
+    directory. `progress` shows the progress on stderr, by default if that is a terminal.
+
+    Raises `TypeError` for a parameter of another kind, `ValueError` for invalid setpoints and options, and for a
+    directory with another study, naming what differs.
     """
     if threads is not None and threads < 1:
         raise ValueError(f"threads {threads}: must be at least 1")
-    # Setpoints are planned on the machine as it is, once.
-    count = threads or len(os.sched_getaffinity(0))
-    given = [dict(variant) for variant in variants]
-    rows = machine.native.sweep(given, machine._setpoints(psec), figures, count)
-    results = [
-        SweepResult(changes, None if text is None else json.loads(text), error)
-        for changes, (text, error) in zip(given, rows)
-    ]
-    return SweepResults(results)
+    if chunk is not None and chunk < 1:
+        raise ValueError(f"chunk {chunk}: must be at least 1")
+    if out is None and (resume or shard is not None):
+        raise ValueError("resume and shard need a directory as out")
+    index, count = (0, 1) if shard is None else shard
+    if not 0 <= index < count:
+        raise ValueError(f"shard ({index}, {count}): the first number must be from 0 to below the second")
+    rows = variants if isinstance(variants, RandomVariants) else list(variants)
+    setup = Setup(machine, machine._setpoints(psec), figures, _threads(threads, executor))
+    store = None if out is None else shards.Store(Path(out))
+    size = chunk or (store.chunk() if store else None) or _chunk_size(setup, rows, executor, count)
+    if store:
+        size = store.open(shards.identity(setup, rows, size), chunk is not None, resume, (index, count))
+    parts = [(first, min(first + size, len(rows))) for first in range(0, len(rows), size)]
+    mine = [part for number, part in enumerate(parts) if number % count == index]
+    todo = [part for part in mine if not (store and store.has(*part))]
+    produce = chunks.simulate if store is None else chunks.simulate_to_parquet
+    found: dict[int, Any] = {}
+    with chunks.Progress(sum(end - first for first, end in todo), progress) as shown:
+        for (first, end), result in chunks.run(produce, setup, rows, todo, executor):
+            if store:
+                store.write(first, end, result)
+            else:
+                found[first] = result
+            shown.add(end - first)
+    if store:
+        return store.directory
+    results = (SweepResult.of(*one) for first, end in parts for one in zip(rows[first:end], found.pop(first)))
+    return SweepResults(list(results))
+
+
+def _threads(threads: int | None, executor: Client | None) -> int:
+    """Returns the threads of a chunk."""
+    if threads is not None:
+        return threads
+    return len(os.sched_getaffinity(0)) if executor is None else 1
+
+
+def _chunk_size(setup: Setup, rows: Sequence[Mapping[str, Parameter]], executor: Client | None, shards: int) -> int:
+    """Returns the number of variants in a chunk: a multiple of the lanes, and some chunks per shard and thread."""
+    size, workers = CHUNK, shards
+    if executor is not None and len(rows):
+        from . import cluster
+
+        overhead = cluster.measure(executor, setup, rows[:BATCH])
+        size = min(CHUNK, int(np.ceil(overhead.per_chunk / (SHARE * overhead.per_variant))))
+        workers *= max(cluster.thread_count(executor), 1)
+    if workers > 1:
+        size = min(size, -(-len(rows) // (4 * workers)))
+    return max(-(-size // BATCH) * BATCH, BATCH)

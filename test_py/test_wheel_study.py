@@ -1,0 +1,204 @@
+"""Studies with `virtual_axes_py`: the rows of the sweep in this process on a Dask cluster, in files and in shards."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+from distributed import Client, LocalCluster
+
+import virtual_axes_py as va
+from virtual_axes_py import chunks, cluster
+
+BOUNDS = {
+    f"{axis}.position_loop.gpc.{key}": bounds
+    for axis in "xy"
+    for key, bounds in {"n2": (8, 20), "nu": (1, 6), "lambda_rel": (0.01, 1.0)}.items()
+}
+VARIANTS = va.random_variants(5, 1000, BOUNDS)
+
+
+@pytest.fixture(scope="module")
+def machine() -> va.Machine:
+    """Returns the default machine with predictive controllers."""
+    machine = va.Machine.load()
+    return machine.with_({f"{axis}.position_loop.controller": "gpc" for axis in machine.axes})
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Client]:
+    """Yields a client of two workers with one thread each."""
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "host": "127.0.0.1"}
+    with LocalCluster(**options) as local, Client(local) as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def expected(machine: va.Machine) -> va.SweepResults:
+    """Returns the results in this process."""
+    return va.sweep(machine, VARIANTS, va.scenario("ballbar"))
+
+
+def assert_equal(found: pandas.DataFrame, expected: va.SweepResults) -> None:
+    """Compares rows bit for bit; a column without any text has another type in a file."""
+    table = expected.to_pandas()
+    assert found["row"].to_list() == list(range(len(table)))
+    found = found.drop(columns="row")
+    assert list(found.columns) == list(table.columns)
+    for name in table.columns:
+        left, right = found[name].to_numpy(), table[name].to_numpy()
+        assert ((left == right) | (pandas.isna(left) & pandas.isna(right))).all(), name
+
+
+def test_a_cluster_and_files_have_the_rows_of_this_process(
+    machine: va.Machine, client: Client, expected: va.SweepResults, tmp_path: Path
+) -> None:
+    found = va.sweep(machine, VARIANTS, va.scenario("ballbar"), executor=client)
+    assert list(found) == list(expected)
+    directory = va.sweep(machine, VARIANTS, va.scenario("ballbar"), executor=client, out=tmp_path / "study")
+    assert_equal(va.merge(directory), expected)
+    assert_equal(pandas.read_parquet(va.merge(directory, tmp_path / "all.parquet")), expected)
+
+
+def test_variants_of_a_list_with_failures_are_equal_everywhere(
+    machine: va.Machine, client: Client, tmp_path: Path
+) -> None:
+    variants = [{"x.position_loop.gpc.n2": n2} for n2 in range(-2, 20)] + [{"x.delays.alpha_ms": 6.0}, {}]
+    psec = va.scenario("corner-90").psec(machine)
+    here = va.sweep(machine, variants, psec, figures="contour")
+    assert [result.error is not None for result in here].count(True) >= 3
+    assert list(va.sweep(machine, variants, psec, figures="contour", executor=client, chunk=5)) == list(here)
+    directory = va.sweep(machine, variants, psec, figures="contour", chunk=1, out=tmp_path / "study")
+    assert_equal(va.merge(directory), here)
+    with pytest.raises(TypeError, match="x.position_loop.gain"):
+        va.sweep(machine, [{"x.position_loop.gain": None}], psec, executor=client)
+
+
+def test_chunks_of_a_killed_worker_come_once(machine: va.Machine, client: Client, expected: va.SweepResults) -> None:
+    victim = next(iter(client.run(os.getpid).values()))
+    setup = chunks.Setup(machine, va.scenario("ballbar"), "axes", 1)
+    parts = [(first, min(first + 32, 1000)) for first in range(0, 1000, 32)]
+    found: list[tuple[int, int]] = []
+    results: dict[int, list[chunks.Outcome]] = {}
+    for part, outcomes in cluster.run(client, chunks.simulate, setup, VARIANTS, parts):
+        found.append(part)
+        results[part[0]] = outcomes
+        if len(found) == 4:
+            os.kill(victim, signal.SIGKILL)
+    assert sorted(found) == parts
+    rows = [chunks.SweepResult.of(*one) for first, end in parts for one in zip(VARIANTS[first:end], results[first])]
+    assert rows == list(expected)
+    assert victim not in client.run(os.getpid).values()
+
+
+DRIVER = """
+import sys
+sys.path.insert(0, {folder!r})
+import virtual_axes_py as va
+from distributed import Client
+from test_wheel_study import VARIANTS
+with Client({address!r}) as client:
+    machine = va.Machine.from_yaml(open({machine!r}).read())
+    va.sweep(machine, VARIANTS, va.scenario("ballbar"), executor=client, chunk=32, out={out!r})
+"""
+
+
+def test_a_killed_driver_is_resumed(
+    machine: va.Machine, client: Client, expected: va.SweepResults, tmp_path: Path
+) -> None:
+    out, file = tmp_path / "study", tmp_path / "machine.yaml"
+    file.write_text(machine.to_yaml())
+    folder, address = str(Path(__file__).parent), client.scheduler.address
+    program = DRIVER.format(folder=folder, address=address, machine=str(file), out=str(out))
+    driver = subprocess.Popen([sys.executable, "-c", program])
+    try:
+        deadline = time.monotonic() + 60
+        while len(list(out.glob("rows-*.parquet"))) < 3:
+            assert time.monotonic() < deadline and driver.poll() is None
+            time.sleep(0.005)
+        driver.send_signal(signal.SIGKILL)
+    finally:
+        driver.kill()
+        driver.wait(timeout=10)
+    done = {path: path.stat().st_mtime_ns for path in out.glob("rows-*.parquet")}
+    assert 3 <= len(done) < 32
+    with pytest.raises(ValueError, match=r"rows \d+ to \d+ are missing"):
+        va.merge(out)
+    with pytest.raises(ValueError, match="resume=True"):
+        va.sweep(machine, VARIANTS, va.scenario("ballbar"), out=out)
+    # The rest runs elsewhere, and what is there is kept.
+    va.sweep(machine, VARIANTS, va.scenario("ballbar"), out=out, resume=True)
+    assert all(path.stat().st_mtime_ns == modified for path, modified in done.items())
+    assert_equal(va.merge(out), expected)
+
+
+def test_another_study_in_the_directory_is_named(machine: va.Machine, tmp_path: Path) -> None:
+    out, still = tmp_path / "study", np.zeros((5, 5))
+    variants = VARIANTS[:8]
+    va.sweep(machine, variants, still, out=out, chunk=4)
+    cases = [
+        ("machine", (machine.with_({"x.position_loop.gain": 2.0}), variants, still, "axes")),
+        ("motion", (machine, variants, np.zeros((6, 5)), "axes")),
+        ("variants", (machine, va.random_variants(6, 8, BOUNDS), still, "axes")),
+        ("variants, rows", (machine, VARIANTS[:9], still, "axes")),
+        ("figures", (machine, variants, still, "contour")),
+    ]
+    for name, (other, rows, psec, figures) in cases:
+        with pytest.raises(ValueError, match=f"another study: {name} differ"):
+            va.sweep(other, rows, psec, figures=figures, out=out, resume=True)
+    with pytest.raises(ValueError, match="another study: chunk differ"):
+        va.sweep(machine, variants, still, out=out, chunk=2, resume=True)
+    assert va.sweep(machine, variants, still, out=out, resume=True) == out
+
+
+def test_shards_complete_each_other_and_a_merge_names_gaps_and_overlaps(
+    machine: va.Machine, expected: va.SweepResults, tmp_path: Path
+) -> None:
+    out = tmp_path / "study"
+    for index in (2, 0):
+        va.sweep(machine, VARIANTS, va.scenario("ballbar"), out=out, shard=(index, 3), chunk=100)
+    with pytest.raises(ValueError, match="rows 100 to 199 are missing"):
+        va.merge(out)
+    va.sweep(machine, VARIANTS, va.scenario("ballbar"), out=out, shard=(1, 3), chunk=100)
+    assert_equal(va.merge(out), expected)
+    one = out / "rows-000000100-000000200.parquet"
+    (out / "rows-000000150-000000200.parquet").write_bytes(one.read_bytes())
+    with pytest.raises(ValueError, match="rows-000000100-000000200.parquet and rows-000000150-.* overlap"):
+        va.merge(out)
+    (out / "rows-000000150-000000200.parquet").unlink()
+    one.write_bytes(one.read_bytes()[:1000])
+    with pytest.raises(ValueError, match="rows-000000100-000000200.parquet is damaged"):
+        va.merge(out)
+
+
+def test_random_variants_depend_on_seed_and_index_only() -> None:
+    few, many = va.random_variants(1, 10, BOUNDS), va.random_variants(1, 10_000_000, BOUNDS)
+    assert list(few) == list(many[:10]) and many[5_000_000:][2] == many[5_000_002]
+    assert va.random_variants(2, 10, BOUNDS)[0] != few[0]
+    drawn = [variant["x.position_loop.gpc.n2"] for variant in many[:2000]]
+    assert set(drawn) == set(range(8, 21)) and all(isinstance(value, int) for value in drawn)
+    weights = np.array([variant["y.position_loop.gpc.lambda_rel"] for variant in many[:2000]])
+    assert weights.min() >= 0.01 and weights.max() <= 1.0 and abs(weights.mean() - 0.505) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"chunk": 0}, "chunk 0"),
+        ({"resume": True}, "need a directory"),
+        ({"shard": (2, 2), "out": "nowhere"}, "shard"),
+    ],
+)
+def test_an_option_out_of_range_is_named(options: dict, text: str, machine: va.Machine) -> None:
+    with pytest.raises(ValueError, match=text):
+        va.sweep(machine, [{}], np.zeros((5, 5)), **options)
+    with pytest.raises(ValueError, match="lower one first"):
+        va.random_variants(0, 1, {"x.position_loop.gain": (2.0, 1.0)})
