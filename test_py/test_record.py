@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from control_msgs.msg import JointTrajectoryControllerState
+from control_msgs.msg import JointTrajectoryControllerState, SpeedScalingFactor
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from mcap.exceptions import EndOfFile
@@ -45,8 +45,10 @@ from drive import (
 MEGABYTE = 1_000_000
 STATES, CURRENTS, DRIVES = "/joint_states", "/virtual_axes/motor_currents", "/virtual_axes/drive_states"
 RESULTS = "/virtual_axes/trajectory_result"
+SCALING = "/virtual_axes/speed_scaling_input"
 KINDS = {
     "/psec": JointTrajectory,
+    SCALING: SpeedScalingFactor,
     CURRENTS: MotorCurrents,
     DRIVES: DriveStates,
     RESULTS: TrajectoryResult,
@@ -142,7 +144,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
     with Node(["-p", f"record:={path}", "-p", "qos.drive_states.depth:=7"]) as process:
         drive = Drive(process=process)
         received_messages: dict[str, list[bytes]] = {
-            topic: [] for topic in KINDS if topic not in ("/psec", CURRENTS, DRIVES)
+            topic: [] for topic in KINDS if topic not in ("/psec", SCALING, CURRENTS, DRIVES)
         }
         for topic, store in received_messages.items():
             profile = RESULT_QOS if topic in (RESULTS, "/rosout") else DEEP_QOS
@@ -151,6 +153,10 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
         trajectory = joint_trajectory(["x", "c"], [0.0, 0.4], [[0.0, 0.0], [0.004, 0.1]])
         drive.run(trajectory, settle=0.1)
         sent["/psec"].append(serialize_message(trajectory))
+        scaling = drive.in_executor(lambda: drive.node.create_publisher(SpeedScalingFactor, SCALING, 10))
+        drive.wait_for(scaling.get_subscription_count, 20, SCALING)
+        scaling.publish(SpeedScalingFactor(factor=0.5))
+        sent[SCALING] = [serialize_message(SpeedScalingFactor(factor=0.5))]
         for k in range(20):
             drive.stream(["x"], [0.004 + 1e-6 * k])
             sent["/psec_stream"].append(serialize_message(JointState(name=["x"], position=[0.004 + 1e-6 * k])))
@@ -193,7 +199,7 @@ def test_every_topic_is_recorded_with_its_type_and_profile(session: Session):
         assert profile["reliability"] == reliability.name.lower(), topic
         assert profile["durability"] == durability.name.lower(), topic
         assert profile["history"] == "keep_last" and profile["depth"] >= 1
-    assert all(messages[topic] for topic in wanted)
+    assert not [topic for topic in wanted if not messages[topic]]
     (profile,) = yaml.safe_load(channels[DRIVES].metadata["offered_qos_profiles"])
     assert profile["depth"] == 7
 

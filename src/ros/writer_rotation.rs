@@ -124,8 +124,8 @@ pub(super) struct RotationContext {
 }
 
 /// Number of writers that ros2-client does not list: the response writers of `send_goal` and `get_result`
-/// (`Service::for_action`).
-const WRITERS_OUTSIDE_NODES: usize = 2;
+/// (`Service::for_action`) of the two actions, `~/follow_joint_trajectory` and `~/run_program`.
+const WRITERS_OUTSIDE_NODES: usize = 4;
 
 impl RotatedTopics {
     /// Adds a topic with its writers.
