@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import time
 import warnings
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -118,6 +121,23 @@ def len_of(env: ContouringEnv, seed: int) -> int:
     return steps
 
 
+def test_the_vector_environment_is_at_least_5_times_as_fast_per_machine() -> None:
+    one, many = ContouringEnv(), ContouringVectorEnv(64)
+    one.reset()
+    many.reset()
+
+    def seconds(env: ContouringEnv | ContouringVectorEnv) -> float:
+        action = np.zeros(env.action_space.shape or (), dtype=np.float32)
+        start = time.perf_counter()
+        for _ in range(300):
+            env.step(action)
+        return time.perf_counter() - start
+
+    # In turns, so that other load on the machine strikes both alike.
+    ratios = [64 * seconds(one) / seconds(many) for _ in range(5)]
+    assert np.median(ratios) >= 5, ratios
+
+
 def test_an_offset_of_the_velocity_setpoint_moves_an_axis_at_rest_by_its_gain(machine: va.Machine) -> None:
     stepper = va.Stepper(machine)
     stepper.set_velocity_offset([0.5, 0, 0, 0, 0])
@@ -145,3 +165,13 @@ def test_an_offset_of_the_velocity_setpoint_moves_an_axis_at_rest_by_its_gain(ma
 def test_an_option_out_of_range_is_named(options: dict, text: str) -> None:
     with pytest.raises(ValueError, match=text):
         ContouringEnv(**options).reset()
+
+
+def test_the_programs_of_the_documentation_run() -> None:
+    page = (Path(__file__).resolve().parent.parent / "docs/how-to/learning.md").read_text(encoding="utf-8")
+    programs = re.findall(r"^```python\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    assert len(programs) == 2
+    names: dict = {}
+    for program in programs:
+        exec(compile(program, "learning.md", "exec"), names)
+    assert names["ended"].shape == (64,)

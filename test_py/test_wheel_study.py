@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,6 +16,7 @@ import numpy as np
 import pandas
 import pytest
 from distributed import Client, LocalCluster
+from optuna.trial import TrialState
 
 import virtual_axes_py as va
 from virtual_axes_py import chunks, cluster
@@ -69,14 +72,15 @@ def test_a_cluster_and_files_have_the_rows_of_this_process(
 
 
 def test_variants_of_a_list_with_failures_are_equal_everywhere(
-    machine: va.Machine, client: Client, tmp_path: Path
+    machine: va.Machine, client: Client, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     variants = [{"x.position_loop.gpc.n2": n2} for n2 in range(-2, 20)] + [{"x.delays.alpha_ms": 6.0}, {}]
     psec = va.scenario("corner-90").psec(machine)
     here = va.sweep(machine, variants, psec, figures="contour")
     assert [result.error is not None for result in here].count(True) >= 3
     assert list(va.sweep(machine, variants, psec, figures="contour", executor=client, chunk=5)) == list(here)
-    directory = va.sweep(machine, variants, psec, figures="contour", chunk=1, out=tmp_path / "study")
+    directory = va.sweep(machine, variants, psec, figures="contour", chunk=1, out=tmp_path / "study", progress=True)
+    assert "\r24 of 24 variants, " in capsys.readouterr().err
     assert_equal(va.merge(directory), here)
     with pytest.raises(TypeError, match="x.position_loop.gain"):
         va.sweep(machine, [{"x.position_loop.gain": None}], psec, executor=client)
@@ -189,6 +193,95 @@ def test_random_variants_depend_on_seed_and_index_only() -> None:
     assert weights.min() >= 0.01 and weights.max() <= 1.0 and abs(weights.mean() - 0.505) < 0.02
 
 
+SEARCHED: dict[str, tuple] = {
+    f"{axis}.position_loop.gpc.{key}": bounds
+    for axis in "xy"
+    for key, bounds in {"n2": (8, 20), "nu": (1, 8), "lambda_rel": (1e-3, 1.0, "log")}.items()
+}
+
+
+START = {key: {"n2": 14, "nu": 2, "lambda_rel": 0.05}[key.rsplit(".", 1)[1]] for key in SEARCHED}
+
+
+def rms(machine: va.Machine) -> float:
+    """Returns the RMS contour error of a machine on the ballbar, µm."""
+    return machine.simulate(va.scenario("ballbar"), figures="contour").figures["contour_error_um"]["rms"]
+
+
+def test_a_search_finds_a_better_machine_and_respects_margins(machine: va.Machine) -> None:
+    machine = machine.with_(START)
+    free = va.optimize(machine, va.scenario("ballbar"), SEARCHED, "contour_error_um.rms", trials=128, seed=1)
+    assert free.value == rms(free.machine) < rms(machine)
+    first = free.study.trials[0]
+    assert first.value == rms(machine) and first.params == START
+    limits = {"margin.modulus": (0.65, None), "axes.x.peak_current_a": (None, 40.0)}
+    search = {"trials": 128, "seed": 1, "constraints": limits}
+    safe = va.optimize(machine, va.scenario("ballbar"), SEARCHED, "contour_error_um.rms", **search)
+    # Without the constraint the margin is smaller, so that it decides.
+    assert modulus(free.machine) < 0.65 <= modulus(safe.machine)
+    assert safe.value == rms(safe.machine) > free.value
+    with pytest.raises(ValueError, match="none of 32 trials"):
+        limits = {"margin.modulus": (0.99, None)}
+        va.optimize(machine, va.scenario("x-constant"), SEARCHED, "duration_s", trials=32, constraints=limits)
+
+
+def modulus(machine: va.Machine) -> float:
+    """Returns the smaller modulus margin of X and Y."""
+    design = va.design
+    return min(design.margins(design.model(machine, axis), design.of_machine(machine, axis)).modulus for axis in "xy")
+
+
+SEARCH = """
+import sys
+sys.path.insert(0, {folder!r})
+import virtual_axes_py as va
+from test_wheel_study import SEARCHED
+machine = va.Machine.from_yaml(open({machine!r}).read())
+found = va.optimize(
+    machine, va.scenario("corner-90"), SEARCHED, lambda figures: figures["contour_error_um"]["rms"],
+    trials=96, batch=8, storage={storage!r},
+)
+print(found.value)
+"""
+
+
+def test_two_processes_share_a_search(machine: va.Machine, tmp_path: Path) -> None:
+    journal, file = tmp_path / "journal", tmp_path / "machine.yaml"
+    file.write_text(machine.to_yaml())
+    program = SEARCH.format(folder=str(Path(__file__).parent), machine=str(file), storage=str(journal))
+    searches = [subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    try:
+        values = [float(search.communicate(timeout=100)[0]) for search in searches]
+    finally:
+        for search in searches:
+            search.kill()
+            search.wait(timeout=10)
+    records = [json.loads(line) for line in journal.read_text().splitlines()]
+    finished = [record for record in records if record.get("state") in (TrialState.COMPLETE, TrialState.FAIL)]
+    assert len({record["worker_id"] for record in finished}) == 2
+    assert 96 <= len(finished) == len({record["trial_id"] for record in finished}) <= 96 + 8
+    found = va.optimize(machine, va.scenario("corner-90"), SEARCHED, "contour_error_um.rms", trials=96, storage=journal)
+    assert len(found.study.trials) == len(finished)
+    assert found.value == min(values)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "objective", "options", "text"),
+    [
+        (SEARCHED, "contour_error_um.mean", {}, "figure contour_error_um.mean is unknown; known are duration_s"),
+        ({"x.foo": (0, 1)}, "duration_s", {}, "x.foo is unknown"),
+        ({"x.position_loop.gain": (2.0, 1.0)}, "duration_s", {}, "lower one first"),
+        (SEARCHED, "duration_s", {"constraints": {"margin.size": (0, None)}}, "margin.size: margins are modulus"),
+        (SEARCHED, "duration_s", {"trials": 0}, "trials 0"),
+    ],
+)
+def test_a_wrong_argument_of_a_search_is_named(
+    parameters: dict, objective: str, options: dict, text: str, machine: va.Machine
+) -> None:
+    with pytest.raises(ValueError, match=text):
+        va.optimize(machine, va.scenario("x-constant"), parameters, objective, **{"trials": 4, **options})
+
+
 @pytest.mark.parametrize(
     ("options", "text"),
     [
@@ -202,3 +295,41 @@ def test_an_option_out_of_range_is_named(options: dict, text: str, machine: va.M
         va.sweep(machine, [{}], np.zeros((5, 5)), **options)
     with pytest.raises(ValueError, match="lower one first"):
         va.random_variants(0, 1, {"x.position_loop.gain": (2.0, 1.0)})
+
+
+@pytest.mark.parametrize(
+    ("package", "call", "extra"),
+    [
+        ("gymnasium", "import virtual_axes_py.gym", "gym"),
+        ("distributed", "va.sweep(m, [{}], still, executor=object())", "dask"),
+        ("pyarrow", "va.sweep(m, [{}], still, out='study')", "parquet"),
+        ("optuna", "va.optimize(m, still, {'x.position_loop.gain': (1.0, 2.0)}, 'duration_s')", "optuna"),
+    ],
+)
+def test_a_missing_package_is_named_with_its_extra(package: str, call: str, extra: str, tmp_path: Path) -> None:
+    lines = [
+        f"import sys; sys.modules[{package!r}] = None",
+        "import numpy as np, virtual_axes_py as va",
+        "m, still = va.Machine.load(), np.zeros((5, 5))",
+        call,
+    ]
+    command = [sys.executable, "-c", "\n".join(lines)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=tmp_path)
+    assert done.returncode == 1
+    assert "ImportError: " in done.stderr and f"pip install 'virtual_axes_py[{extra}]'" in done.stderr
+
+
+def test_the_programs_of_the_documentation_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).resolve().parent.parent / "docs/how-to/studies.md").read_text(encoding="utf-8")
+    programs = re.findall(r"^```python\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    assert len(programs) == 5
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SLURM_ARRAY_TASK_ID", "0")
+    monkeypatch.setenv("SLURM_ARRAY_TASK_COUNT", "1")
+    # The cluster of the page runs in a program of its own.
+    names: dict = {"__name__": "page"}
+    for program in programs:
+        for long, short in (("100_000", "64"), ("trials=320", "trials=32")):
+            program = program.replace(long, short)
+        exec(compile(program, "studies.md", "exec"), names)
+    assert len(names["results"]) == len(names["table"]) == 64 and names["found"].changes

@@ -18,6 +18,7 @@ from . import design
 from ._native import PartProgram, Scenario, machine_names, scenario_names
 from .chunks import SweepResult
 from .machine import SIGNALS, Machine
+from .optimization import Optimum, optimize
 from .run import Run
 from .shards import merge
 from .stepper import Stepper
@@ -26,6 +27,7 @@ from .study import SweepResults, random_variants, sweep
 __all__ = [
     "SIGNALS",
     "Machine",
+    "Optimum",
     "PartProgram",
     "Run",
     "Scenario",
@@ -36,6 +38,7 @@ __all__ = [
     "machine_names",
     "merge",
     "nc_program",
+    "optimize",
     "random_variants",
     "scenario",
     "scenario_names",

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import pandas
     from distributed import Client
 
+    from .cluster import Overhead
     from .machine import Parameter, Setpoints
 
 BATCH = 32
@@ -25,7 +26,9 @@ BATCH = 32
 CHUNK = 4096
 """Most variants in a chunk."""
 SHARE = 0.02
-"""Overhead of a chunk as a part of its duration, which determines its size."""
+"""Largest overhead of a chunk as a part of its duration."""
+SCHEDULER_SHARE = 0.5
+"""Largest overhead of the chunks of all workers as a part of their duration."""
 
 
 class SweepResults(Sequence[SweepResult]):
@@ -159,7 +162,7 @@ def sweep(
 
     `executor` is a Dask `Client` (extra `dask`): its workers simulate chunks of variants, each with 1 thread or
     `threads`. A chunk of a lost worker is simulated again. `chunk` is the number of variants in a chunk; by default the
-    overhead of a chunk is measured and kept at 2 % of its duration. The results depend on none of these.
+    overhead of a chunk is measured and kept below 2 % of its duration. The results depend on none of these.
 
     `out` is a directory (extra `parquet`): each chunk becomes a Parquet file there, and the directory is returned, for
     `merge`. With `resume` the chunks in the directory are kept, if machine, motion, variants and figures are equal.
@@ -210,14 +213,22 @@ def _threads(threads: int | None, executor: Client | None) -> int:
 
 
 def _chunk_size(setup: Setup, rows: Sequence[Mapping[str, Parameter]], executor: Client | None, shards: int) -> int:
-    """Returns the number of variants in a chunk: a multiple of the lanes, and some chunks per shard and thread."""
-    size, workers = CHUNK, shards
-    if executor is not None and len(rows):
-        from . import cluster
+    """Returns the number of variants in a chunk."""
+    if executor is None or not len(rows):
+        return chunk_size(None, len(rows), shards)
+    from . import cluster
 
-        overhead = cluster.measure(executor, setup, rows[:BATCH])
-        size = min(CHUNK, int(np.ceil(overhead.per_chunk / (SHARE * overhead.per_variant))))
-        workers *= max(cluster.thread_count(executor), 1)
+    threads = max(cluster.thread_count(executor), 1)
+    return chunk_size(cluster.measure(executor, setup, rows[:BATCH]), len(rows), shards * threads)
+
+
+def chunk_size(overhead: Overhead | None, rows: int, workers: int) -> int:
+    """Returns the number of variants in a chunk: a multiple of the lanes, and at least 4 chunks per worker."""
+    size = CHUNK
+    if overhead:
+        # One scheduler serves all workers.
+        share = min(SHARE, SCHEDULER_SHARE / workers)
+        size = min(size, int(np.ceil(overhead.per_chunk / (share * overhead.per_variant))))
     if workers > 1:
-        size = min(size, -(-len(rows) // (4 * workers)))
+        size = min(size, -(-rows // (4 * workers)))
     return max(-(-size // BATCH) * BATCH, BATCH)
