@@ -115,6 +115,25 @@ fn cascade_recovers_from_a_load_that_saturates_the_current() {
 }
 
 #[test]
+fn an_offset_of_the_velocity_setpoint_moves_an_axis_at_rest_by_offset_over_gain() {
+    let mut m = machine(&[]);
+    m.set_velocity_offset(X, 0.5);
+    for _ in 0..1000 {
+        m.advance(&[0.0; 5], &[]);
+    }
+    // At rest 0 = offset − K θ, with K = 1.5 m/min/mm = 25 1/s. 1 µrad is a hundredth of the position error that
+    // friction holds.
+    assert_near("angle, rad", m.axis(X).sample().position * TAU / 0.020, 0.5 / 25.0, 1e-6);
+    assert!(m.axis(Z).sample().position.abs() < 1e-15);
+    m.set_velocity_offset(X, 1e6);
+    m.advance(&[0.0; 5], &[]);
+    assert_near("speed limit, rad/s", m.axis(X).sample().velocity_setpoint, 2000.0 * TAU / 60.0, 1e-9);
+    m.reset(&[0.0; 5]);
+    m.advance(&[0.0; 5], &[]);
+    assert_near("Ω* after a reset, rad/s", m.axis(X).sample().velocity_setpoint, 0.0, 1e-12);
+}
+
+#[test]
 fn vertical_axis_stays_at_rest_under_gravity() {
     let mut m = machine(&[]);
     for _ in 0..1000 {
