@@ -6,7 +6,7 @@ use virtual_axes_core::assess::{PathDeviations, PathTracker};
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters, SimdWidth};
-use virtual_axes_core::trial::{Figures, Measures, Trial, run, run_variants, trace};
+use virtual_axes_core::trial::{Measures, Trial, run, run_variants, trace};
 use virtual_axes_core::units::seconds;
 use virtual_axes_verification::fixtures::machines::{
     AXES, TSP, configured, configured_with, program, setpoints, trace_scenario,
@@ -106,6 +106,37 @@ fn axes_are_bit_identical_alone_and_concatenated() {
 }
 
 #[test]
+fn a_reset_axis_is_bit_identical_to_a_new_one_and_the_others_go_on() {
+    let config = configured("mikron_ucp710", &["position_loop.controller=gpc"]);
+    let (mut reset, mut other) = (Machine::new(parameters(&config)), Machine::new(parameters(&config)));
+    let mut new = Machine::new(parameters(&config));
+    let now = |k: usize| [0, 1, 2, 3, 4].map(|axis| psec(axis, k));
+    for k in 0..CYCLES {
+        if k == 100 {
+            reset.reset_axis(0, psec(0, 0));
+            new.reset(&now(0));
+        }
+        let mut given = now(k);
+        other.advance(&given, &[]);
+        if k >= 100 {
+            given[0] = psec(0, k - 100);
+            new.advance(&now(k - 100), &[]);
+        }
+        reset.advance(&given, &[]);
+        if k >= 100 {
+            assert_eq!(bits(reset.axis(0).sample()), bits(new.axis(0).sample()), "cycle {k}");
+        }
+        for axis in 1..AXES {
+            assert_eq!(
+                bits(reset.axis(axis).sample()),
+                bits(other.axis(axis).sample()),
+                "axis {axis}, cycle {k}"
+            );
+        }
+    }
+}
+
+#[test]
 fn machines_with_different_periods_cannot_be_concatenated() {
     let slow = configured("mikron_ucp710", &[]);
     let fast = virtual_axes_verification::fixtures::machines::parameters(&[("periods.current_us", 62.5)])
@@ -176,8 +207,7 @@ fn variants_in_one_machine_have_the_figures_of_separate_runs() {
         assert_eq!(together.len(), variants.len());
         for (variant, figures) in variants.iter().zip(&together) {
             let alone = run(&trial(variant), setpoints(variant), |_| Ok(())).expect("a run").figures;
-            let without_circles = Figures { circles: vec![], bidirectional: vec![], ..alone.clone() };
-            assert_eq!(*figures, without_circles, "{scenario}");
+            assert_eq!(*figures, alone, "{scenario}");
             let traced = trace(&trial(variant), setpoints(variant), |_| Ok(())).expect("a run").figures;
             assert_eq!(traced, alone, "{scenario}");
         }
