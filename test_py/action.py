@@ -1,6 +1,6 @@
 """Client of the node's action FollowJointTrajectory.
 
-    with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive, Follow(drive) as follow:
+    with Node(["-p", "time:=fast"]) as process, AxesClient(process=process) as drive, Follow(drive) as follow:
         sent = follow.send(goal(joint_trajectory(["x"], [0, 1], [0, 0.1])))
         print(sent.result().error_string)
 
@@ -25,7 +25,7 @@ from trajectory_msgs.msg import JointTrajectory
 from unique_identifier_msgs.msg import UUID
 from virtual_axes.msg import TrajectoryResult
 
-from drive import NANOSECONDS, SETTLE_S, Drive, joint_trajectory
+from virtual_axes_py.ros import NANOSECONDS, SETTLE_S, AxesClient, joint_trajectory
 
 Result = FollowJointTrajectory.Result
 FEEDBACK_QOS = QoSProfile(depth=1000)
@@ -113,9 +113,11 @@ class Sent:
 
 
 class Follow:
-    """Action client in the graph, part of a Drive."""
+    """Action client in the graph, part of a AxesClient."""
 
-    def __init__(self, drive: Drive, name: str | None = None, timeout: float = 20.0, kind: Any = FollowJointTrajectory):
+    def __init__(
+        self, drive: AxesClient, name: str | None = None, timeout: float = 20.0, kind: Any = FollowJointTrajectory
+    ):
         """Waits for the server of an action of type `kind`; `name` is the action's remapped name."""
         self.name = name or f"{drive.target}/follow_joint_trajectory"
         self.drive = drive
@@ -142,7 +144,7 @@ class Follow:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Destroys the client; the Drive stays connected."""
+        """Destroys the client; the AxesClient stays connected."""
 
         def leave() -> None:
             self.client.destroy()

@@ -23,8 +23,9 @@ for variable in ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", "ROS_DOMAIN_ID"):
 # launch is not on PyPI: its stand-in is imported under the names of the real package.
 sys.path.insert(0, str(Path(__file__).parent / "launch_standin"))
 
-from drive import Drive, Node, node_binary  # noqa: E402
 from motion import go_home  # noqa: E402
+from node_process import Node, node_binary  # noqa: E402
+from virtual_axes_py.ros import AxesClient  # noqa: E402
 
 if TYPE_CHECKING:
     from action import Follow
@@ -37,16 +38,16 @@ def pytest_sessionstart() -> None:
 
 
 @pytest.fixture(scope="module")
-def real() -> Iterator[Drive]:
+def real() -> Iterator[AxesClient]:
     """Yields axes in real time, shared by a module; motions there have at most 20 000 points."""
-    with Node(["-p", "time:=real", "-p", "max_points:=20000"]) as process, Drive(process=process) as drive:
+    with Node(["-p", "time:=real", "-p", "max_points:=20000"]) as process, AxesClient(process=process) as drive:
         yield drive
 
 
 @pytest.fixture(scope="module")
-def fast() -> Iterator[Drive]:
+def fast() -> Iterator[AxesClient]:
     """Yields axes in mode `fast`, shared by a module."""
-    with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive:
+    with Node(["-p", "time:=fast"]) as process, AxesClient(process=process) as drive:
         yield drive
 
 
@@ -57,7 +58,7 @@ def following() -> Iterator[Follow]:
     from action import Follow
 
     args = ["-p", "time:=fast", "-p", "action_monitor_rate:=50.0"]
-    with Node(args) as process, Drive(process=process) as drive, Follow(drive) as follow:
+    with Node(args) as process, AxesClient(process=process) as drive, Follow(drive) as follow:
         yield follow
 
 
@@ -69,13 +70,13 @@ def follow(following: Follow) -> Follow:
 
 
 @pytest.fixture
-def start() -> Iterator[Callable[..., Drive]]:
-    """Starts nodes for one test: start(*ros_args, name=...) returns a connected Drive."""
+def start() -> Iterator[Callable[..., AxesClient]]:
+    """Starts nodes for one test: start(*ros_args, name=...) returns a connected AxesClient."""
     with ExitStack() as stack:
 
-        def start_one(*ros_args: str, connect: bool = True, **options: object) -> Drive:
+        def start_one(*ros_args: str, connect: bool = True, **options: object) -> AxesClient:
             process = stack.enter_context(Node(ros_args, **options))
-            return stack.enter_context(Drive(process=process, connect=connect))
+            return stack.enter_context(AxesClient(process=process, connect=connect))
 
         yield start_one
 

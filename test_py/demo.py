@@ -16,8 +16,9 @@ import matplotlib
 matplotlib.use("Agg")
 import numpy as np
 
-from drive import Ballbar, Drive, Node, Recording, ballbar, circular_deviation, joint_trajectory
+from node_process import Node
 from polar_chart import Circle, draw
+from virtual_axes_py.ros import AxesClient, Ballbar, Recording, ballbar, circular_deviation, joint_trajectory
 
 AXES = ("x", "y")
 RUNS: dict[str, dict[str, object]] = {
@@ -34,10 +35,10 @@ MODEL_UM = {"cascade with feedforward": +49.0, "cascade without feedforward": -2
 """Specified mean radial deviation of this package's model, µm."""
 
 
-def measure(drive: Drive, path: Ballbar) -> Recording:
+def measure(drive: AxesClient, path: Ballbar) -> Recording:
     """Runs the circle once from home, over the topic `psec`."""
     drive.reset()
-    drive.forget()
+    drive.drop_samples()
     return drive.run(joint_trajectory(AXES, path.time, np.column_stack([path.x, path.y])), timeout=60)
 
 
@@ -113,7 +114,7 @@ def main() -> int:
     path = ballbar()
     clock = "fast" if arguments.fast else "real"
     runs: dict[str, Recording] = {}
-    with Node(["-p", f"time:={clock}"]) as process, Drive(process=process) as drive:
+    with Node(["-p", f"time:={clock}"]) as process, AxesClient(process=process) as drive:
         print(f"node {process.name}, process {process.pid}, domain {process.domain_id}, time: {clock}")
         for title, values in RUNS.items():
             drive.set_parameters(values)

@@ -30,7 +30,8 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from virtual_axes.msg import DriveStates, MotorCurrents
 
-from drive import DEEP_QOS, TSP_NS, Drive, Node, joint_trajectory, status_values, to_ns
+from node_process import Node
+from virtual_axes_py.ros import DEEP_QOS, TSP_NS, AxesClient, joint_trajectory, status_values, to_ns
 
 JOINTS = ("x", "y")
 DAMPING = 4000.0
@@ -49,7 +50,7 @@ TOPICS = {"joint_states": JointState, "motor_currents": MotorCurrents, "drive_st
 
 def source(seconds: float) -> None:
     """Sends swings of both axes, one trajectory after the other without a gap."""
-    with Drive() as drive:
+    with AxesClient() as drive:
         print(READY, flush=True)
         periods = round(SWING * 1e9 / TSP_NS)
         times = np.arange(periods) * TSP_NS / 1e9

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from drive import node_binary
+from node_process import node_binary
 
 
 @cache

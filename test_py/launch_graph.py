@@ -10,7 +10,7 @@ import launch
 from launch_ros import substitutions
 from launch_ros.actions import Node as NodeAction
 
-from drive import node_binary
+from node_process import node_binary
 
 ROOT = Path(__file__).resolve().parent.parent
 substitutions.PROGRAMS["virtual_axes", "virtual_axes"] = str(node_binary().with_name("virtual_axes"))

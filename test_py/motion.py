@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from drive import TSP_NS, Drive, joint_trajectory, to_ns
+from virtual_axes_py.ros import TSP_NS, AxesClient, joint_trajectory, to_ns
 
 TSP = TSP_NS / 1e9
 """Position cycle, s."""
@@ -23,13 +23,13 @@ def swing(duration: float, amplitude: float = 0.05, rest: float = 0.0) -> tuple[
     return time, amplitude / 2 * (1 - np.cos(2 * np.pi * phase))
 
 
-def on_grid(drive: Drive, instant: int) -> int:
+def on_grid(drive: AxesClient, instant: int) -> int:
     """Returns the first position cycle at or after `instant`, ns."""
     return grid_after(drive.now(), instant)
 
 
 def assert_psec(
-    drive: Drive,
+    drive: AxesClient,
     start: int,
     plan: Mapping[str, Sequence[float]],
     first: int | None = None,
@@ -63,14 +63,14 @@ def grid_after(start: int, instant: int) -> int:
     return start + -(-(instant - start) // TSP_NS) * TSP_NS
 
 
-def start_swing(drive: Drive, joints: Sequence[str] = ("x",), duration: float = 6.0, **options: float):
+def start_swing(drive: AxesClient, joints: Sequence[str] = ("x",), duration: float = 6.0, **options: float):
     """Starts a swing on `joints`; returns its acceptance, its start and its plan."""
     time, position = swing(duration, **options)
     accepted = drive.accept(joint_trajectory(joints, time, np.column_stack([position] * len(joints))))
     return accepted, to_ns(accepted.start), {joint: position for joint in joints}
 
 
-def go_home(drive: Drive) -> None:
+def go_home(drive: AxesClient) -> None:
     """Resets the axes to rest at the start position and drops old samples."""
 
     def at_home() -> bool:
@@ -87,4 +87,4 @@ def go_home(drive: Drive) -> None:
             if patience_s == 60:
                 raise
     drive.wait_until(drive.now() + 2 * TSP_NS, 5)
-    drive.forget()
+    drive.drop_samples()

@@ -38,7 +38,8 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from virtual_axes.msg import DriveStates, MotorCurrents
 
-from drive import DEEP_QOS, PSEC_QOS, SETTLE_S, die_with_parent, stamp_of
+from node_process import die_with_parent
+from virtual_axes_py.ros import DEEP_QOS, PSEC_QOS, SETTLE_S, stamp_of
 
 READY = "ready"
 SPINS = "spins"

@@ -8,16 +8,16 @@ import numpy as np
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 
-from drive import TSP_NS, Drive, to_time
+from virtual_axes_py.ros import TSP_NS, AxesClient, to_time
 
 REPEAT_S = 0.1
 """Timeout for a response, s. The clock is best effort: after it the time is published again."""
 
 
 class SimClock:
-    """Publisher of `/clock` through a Drive's node, best effort like rosbag2, or reliable."""
+    """Publisher of `/clock` through a AxesClient's node, best effort like rosbag2, or reliable."""
 
-    def __init__(self, drive: Drive, now: int, reliability: ReliabilityPolicy = ReliabilityPolicy.BEST_EFFORT):
+    def __init__(self, drive: AxesClient, now: int, reliability: ReliabilityPolicy = ReliabilityPolicy.BEST_EFFORT):
         """Creates the publisher; the clock will begin at `now`, ns."""
         self.drive = drive
         self.now = now

@@ -22,7 +22,7 @@ from collections import Counter
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 
-from drive import DomainId, Node, die_with_parent
+from node_process import DomainId, Node, die_with_parent
 
 RUSTDDS = bytes([0x01, 0x12])
 """Vendor id of the nodes, in front of their GUIDs."""

@@ -61,7 +61,7 @@ def messages() -> None:
 def trajectory() -> None:
     """Starts the installed node, submits a trajectory and waits for its result."""
     # Not at the top: it imports rclpy, whose absence must be a failure in the result file.
-    from drive import DomainId, die_with_parent
+    from node_process import DomainId, die_with_parent
 
     # Not the user's domain, nor one of another test; nothing leaves the machine.
     domain = DomainId()

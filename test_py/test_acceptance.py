@@ -9,27 +9,27 @@ import pytest
 from trajectory_msgs.msg import JointTrajectory
 from virtual_axes.msg import TrajectoryResult as R
 
-from drive import NANOSECONDS, TSP_NS, Drive, joint_trajectory, to_ns
 from motion import assert_psec, go_home, on_grid, start_swing, swing
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, to_ns
 
 SPEED_LIMIT_X = 0.5
 ACCELERATION_LIMIT_X = 2.5
 
 
 @pytest.fixture
-def home(real: Drive) -> Iterator[Drive]:
+def home(real: AxesClient) -> Iterator[AxesClient]:
     """Yields axes at rest at home."""
     go_home(real)
     yield real
 
 
-def psec_of(drive: Drive, joint: str, first: int, last: int) -> np.ndarray:
+def psec_of(drive: AxesClient, joint: str, first: int, last: int) -> np.ndarray:
     """Returns psec of a joint from `first` to `last`, ns."""
     drive.wait_until(last, 30)
     return drive.record(first, last).states["psec", joint]
 
 
-def test_stamp_zero_starts_at_the_next_position_period(home: Drive):
+def test_stamp_zero_starts_at_the_next_position_period(home: AxesClient):
     """The start is on the grid, at most one cycle after the decision."""
     accepted, start, plan = start_swing(home, duration=1.2)
     assert accepted.source == R.SOURCE_TOPIC and accepted.code == R.NONE
@@ -41,7 +41,7 @@ def test_stamp_zero_starts_at_the_next_position_period(home: Drive):
     assert ended.name and len(ended.peak_current) == len(ended.name)
 
 
-def test_points_on_the_grid_are_published_unchanged(home: Drive):
+def test_points_on_the_grid_are_published_unchanged(home: AxesClient):
     """Irregular points are published bit for bit."""
     noise = np.cumsum(np.random.default_rng(1).uniform(-1e-5, 1e-5, 400))
     noise[0] = 0.0
@@ -49,7 +49,7 @@ def test_points_on_the_grid_are_published_unchanged(home: Drive):
     assert_psec(home, recording.start, {"z": noise})
 
 
-def test_stamp_in_the_future_waits_while_the_active_motion_continues(home: Drive):
+def test_stamp_in_the_future_waits_while_the_active_motion_continues(home: AxesClient):
     """The active motion is followed until the start, the new one from the start on."""
     _, start, plan = start_swing(home, duration=1.8)
     end = start + (len(plan["x"]) - 1) * TSP_NS
@@ -60,7 +60,7 @@ def test_stamp_in_the_future_waits_while_the_active_motion_continues(home: Drive
     assert_psec(home, to_ns(later.start), {"x": position})
 
 
-def test_start_between_two_periods_is_the_later_one(home: Drive):
+def test_start_between_two_periods_is_the_later_one(home: AxesClient):
     """Points on the trajectory's own grid stay on it."""
     time, position = swing(0.6)
     stamp = home.now() + NANOSECONDS + 1_234_567
@@ -69,7 +69,7 @@ def test_start_between_two_periods_is_the_later_one(home: Drive):
     assert_psec(home, to_ns(accepted.start), {"x": position})
 
 
-def test_stamp_in_the_past_joins_in_with_a_warning(home: Drive):
+def test_stamp_in_the_past_joins_in_with_a_warning(home: AxesClient):
     """The two motions meet at rest, so no jump occurs; points in the past are skipped."""
     time, position = swing(1.2, rest=1.8)
     stamp = on_grid(home, home.now() - NANOSECONDS // 2)
@@ -88,7 +88,7 @@ def test_stamp_in_the_past_joins_in_with_a_warning(home: Drive):
     ],
     ids=["linear", "cubic", "quintic"],
 )
-def test_first_point_later_than_zero_is_moved_to(home: Drive, fields: dict, quarter: float):
+def test_first_point_later_than_zero_is_moved_to(home: AxesClient, fields: dict, quarter: float):
     """The approach starts at the commanded state and is interpolated by the given fields."""
     way = 0.01
     accepted = home.accept(joint_trajectory(["x"], [1.2], [[way]], **fields))
@@ -109,7 +109,7 @@ def test_first_point_later_than_zero_is_moved_to(home: Drive, fields: dict, quar
     ],
     ids=["linear", "cubic", "quintic"],
 )
-def test_between_points_the_fields_decide(home: Drive, fields: dict, quarter: float):
+def test_between_points_the_fields_decide(home: AxesClient, fields: dict, quarter: float):
     """Linear with positions, cubic with velocities, quintic with accelerations."""
     way = 0.01
     recording = home.run(joint_trajectory(["y"], [0.0, 1.2], [[0.0], [way]], **fields))
@@ -118,7 +118,7 @@ def test_between_points_the_fields_decide(home: Drive, fields: dict, quarter: fl
     assert psec[200] == way
 
 
-def test_a_new_trajectory_preempts_the_active_one(home: Drive):
+def test_a_new_trajectory_preempts_the_active_one(home: AxesClient):
     """The transition starts at the commanded state without a jump; the result of the old one is PREEMPTED."""
     first, start, plan = start_swing(home, duration=6.0)
     home.wait_until(start + 150 * TSP_NS, 5)
@@ -134,7 +134,7 @@ def test_a_new_trajectory_preempts_the_active_one(home: Drive):
     assert home.end(second.sequence_number, 10).status == R.COMPLETED
 
 
-def test_chunks_of_a_long_path_join_without_a_gap(home: Drive):
+def test_chunks_of_a_long_path_join_without_a_gap(home: AxesClient):
     """The stamp of each chunk is its absolute start; psec is the whole path."""
     time, position = swing(4.8)
     size = 200
@@ -152,7 +152,7 @@ def test_chunks_of_a_long_path_join_without_a_gap(home: Drive):
 
 
 @pytest.mark.parametrize("names", [[], ["x", "y", "z", "a", "c"]], ids=["no joints", "all joints"])
-def test_no_points_is_a_controlled_stop(home: Drive, names: list[str]):
+def test_no_points_is_a_controlled_stop(home: AxesClient, names: list[str]):
     """The setpoint comes to rest within the limits of the axis, short of its destination."""
     first, start, _ = start_swing(home, duration=3.0, amplitude=0.2)
     home.wait_until(start + 125 * TSP_NS, 5)
@@ -167,7 +167,7 @@ def test_no_points_is_a_controlled_stop(home: Drive, names: list[str]):
     assert 0.01 < psec[-1] < 0.2
 
 
-def test_joints_that_a_trajectory_omits_continue_their_motion(home: Drive):
+def test_joints_that_a_trajectory_omits_continue_their_motion(home: AxesClient):
     """x continues its swing while z moves."""
     _, start, plan = start_swing(home, duration=2.4)
     time, position = swing(0.6, amplitude=0.01)
@@ -177,7 +177,7 @@ def test_joints_that_a_trajectory_omits_continue_their_motion(home: Drive):
     assert home.end(accepted.sequence_number, 5).status == R.COMPLETED
 
 
-def test_order_of_the_joints_is_the_senders(home: Drive):
+def test_order_of_the_joints_is_the_senders(home: AxesClient):
     """Columns are assigned by name."""
     time, position = swing(0.6, amplitude=0.01)
     rows = np.column_stack([position, 2 * position, 0 * position])
@@ -185,12 +185,12 @@ def test_order_of_the_joints_is_the_senders(home: Drive):
     assert_psec(home, recording.start, {"c": position, "x": 2 * position, "a": 0 * position})
 
 
-def test_an_unlimited_rotary_axis_turns_on(home: Drive):
+def test_an_unlimited_rotary_axis_turns_on(home: AxesClient):
     """C has no travel limits: more than a full turn is accepted."""
     home.accept(joint_trajectory(["c"], [30.0], [[7.0]]))
 
 
-def test_100_000_points_arrive_and_are_executed(fast: Drive):
+def test_100_000_points_arrive_and_are_executed(fast: AxesClient):
     """Points at 1 ms; those on the position grid are published bit for bit."""
     time = np.arange(100_000) / 1000
     position = np.column_stack([0.1 * np.sin(time / 5), 0.1 * (1 - np.cos(time / 5))])

@@ -16,7 +16,7 @@ from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 from virtual_axes.msg import TrajectoryResult
 
 from action import Follow, Result, ending, goal, line, results_of, wave
-from drive import DEEP_QOS, NANOSECONDS, TSP_NS, Drive, joint_trajectory, to_ns, to_time
+from virtual_axes_py.ros import DEEP_QOS, NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, to_ns, to_time
 
 TSP = TSP_NS / NANOSECONDS
 
@@ -236,7 +236,7 @@ def test_only_an_id_that_is_in_use_is_rejected(follow: Follow) -> None:
 
 
 def test_a_result_can_be_requested_late_and_by_several_clients(follow: Follow) -> None:
-    with Drive(process=follow.drive.process) as other, Follow(other) as second:
+    with AxesClient(process=follow.drive.process) as other, Follow(other) as second:
         mine = follow.send(goal(line(["x"], [0.01], 0.5)))
         theirs = second.send(goal(line(["y"], [0.01], 0.5)))
         assert mine.status() == theirs.status() == GoalStatus.STATUS_SUCCEEDED
@@ -293,7 +293,7 @@ def test_controller_state_compares_the_axes_with_their_setpoints(follow: Follow)
 # ---- life of the node
 
 
-def test_a_goal_under_way_is_aborted_when_the_node_ends(start: Callable[..., Drive]) -> None:
+def test_a_goal_under_way_is_aborted_when_the_node_ends(start: Callable[..., AxesClient]) -> None:
     drive = start("-p", "time:=real", "-r", "~/follow_joint_trajectory:=/cell/move")
     with Follow(drive, name="/cell/move") as follow:
         sent = follow.send(goal(wave(60)))

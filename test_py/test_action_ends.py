@@ -12,7 +12,7 @@ from trajectory_msgs.msg import JointTrajectory
 from virtual_axes.msg import TrajectoryResult
 
 from action import Follow, Result, ending, goal, line, wave
-from drive import NANOSECONDS, TSP_NS, joint_trajectory, to_ns
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, joint_trajectory, to_ns
 
 TSP = TSP_NS / NANOSECONDS
 FEED = 10 / 60

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from drive import Drive, Recording, ballbar, joint_trajectory
 from motion import assert_psec, go_home
+from virtual_axes_py.ros import AxesClient, Recording, ballbar, joint_trajectory
 
 PATH = ballbar()
 FEEDFORWARD = [f"{axis}.feedforward.{part}" for axis in "xy" for part in ("velocity", "torque_kg_m2")]
 
 
-def run(drive: Drive) -> Recording:
+def run(drive: AxesClient) -> Recording:
     """Runs the circle once, from home."""
     go_home(drive)
     return drive.run(joint_trajectory(["x", "y"], PATH.time, np.column_stack([PATH.x, PATH.y])))
@@ -31,7 +31,7 @@ def test_path_is_the_specified_one():
     assert turned == pytest.approx(4 * np.pi + 0.25 * 0.5 / 0.15, abs=1e-12)
 
 
-def test_with_feedforward_the_circle_is_49_um_too_large(fast: Drive):
+def test_with_feedforward_the_circle_is_49_um_too_large(fast: AxesClient):
     """[P] figure 10, left: 50 µm."""
     recording = run(fast)
     assert_psec(fast, recording.start, {"x": PATH.x, "y": PATH.y})
@@ -41,7 +41,7 @@ def test_with_feedforward_the_circle_is_49_um_too_large(fast: Drive):
     assert deviation.max() < 68.6 + 1.5
 
 
-def test_without_feedforward_the_circle_is_283_um_too_small(fast: Drive):
+def test_without_feedforward_the_circle_is_283_um_too_small(fast: AxesClient):
     """Feedforward is switched off by parameter while the node runs, and on again."""
     before = fast.get_parameters(FEEDFORWARD)
     fast.set_parameters(dict.fromkeys(FEEDFORWARD, 0.0))
@@ -54,7 +54,7 @@ def test_without_feedforward_the_circle_is_283_um_too_small(fast: Drive):
     assert deviation_um(recording).mean() == pytest.approx(-283.1, abs=1.5)
 
 
-def test_errors_in_the_result_are_those_of_the_samples(fast: Drive):
+def test_errors_in_the_result_are_those_of_the_samples(fast: AxesClient):
     """The figures per axis of the result equal those of the samples of the same motion."""
     recording = run(fast)
     result = recording.result
@@ -66,15 +66,15 @@ def test_errors_in_the_result_are_those_of_the_samples(fast: Drive):
         assert result.max_synchronized_tracking_error[column] == pytest.approx(synchronized.max(), rel=1e-9)
         assert result.peak_current[column] >= np.abs(recording.currents["current", joint]).max()
     for joint in ("x", "y"):
-        np.testing.assert_array_equal(recording.tracking_error(joint), recording.states["tracking_error", joint])
+        np.testing.assert_array_equal(recording.following_error(joint), recording.states["tracking_error", joint])
         np.testing.assert_allclose(
-            recording.synchronized_tracking_error(joint)[2:],
+            recording.delay_compensated_following_error(joint)[2:],
             recording.states["synchronized_tracking_error", joint][2:],
             atol=1e-15,
         )
 
 
-def test_the_same_circle_twice_is_the_same_bit_for_bit(fast: Drive):
+def test_the_same_circle_twice_is_the_same_bit_for_bit(fast: AxesClient):
     """From home, positions and currents do not depend on earlier motions."""
     first, second = run(fast), run(fast)
     for series in ("joints", "currents", "states"):

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from documentation.place import Place
-from drive import node_binary
+from node_process import node_binary
 
 PREFIX = Path(sys.prefix)
 PROGRAMS = ("virtual_axes", "virtual_axes_node")

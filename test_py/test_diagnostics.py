@@ -5,9 +5,10 @@ from __future__ import annotations
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from sensor_msgs.msg import JointState
 
-from drive import NANOSECONDS, RECORDING_KEYS, Drive, joint_trajectory, own_mb, status_values, to_ns
 from interface import printed
 from motion import go_home, start_swing
+from node_process import own_mb
+from virtual_axes_py.ros import NANOSECONDS, RECORDING_KEYS, AxesClient, joint_trajectory, status_values, to_ns
 
 
 def text_of(array: DiagnosticArray) -> str:
@@ -26,7 +27,7 @@ def worst(array: DiagnosticArray) -> int:
 WARN = int.from_bytes(DiagnosticStatus.WARN, "little")
 
 
-def test_once_a_second_by_the_nodes_clock(real: Drive):
+def test_once_a_second_by_the_nodes_clock(real: AxesClient):
     """REP-107 requires 1 Hz."""
     seen = len(real.diagnostics())
     arrays = real.wait_for(lambda: real.diagnostics()[seen:][3:] and real.diagnostics()[seen:], 8, "four diagnostics")
@@ -34,7 +35,7 @@ def test_once_a_second_by_the_nodes_clock(real: Drive):
     assert [round((b - a) / NANOSECONDS) for a, b in zip(stamps, stamps[1:])] == [1, 1, 1]
 
 
-def test_at_rest_and_moving(real: Drive):
+def test_at_rest_and_moving(real: AxesClient):
     """States holding and running; at rest all levels are OK except for late releases on a busy computer."""
     go_home(real)
     at_rest = real.next_diagnostics()
@@ -46,7 +47,7 @@ def test_at_rest_and_moving(real: Drive):
     real.stop()
 
 
-def test_friction_law_beyond_its_range_is_a_warning(real: Drive):
+def test_friction_law_beyond_its_range_is_a_warning(real: AxesClient):
     """The friction law is fitted up to 20 m/min; the motion reaches 24 m/min."""
     go_home(real)
     real.accept(joint_trajectory(["x"], [0.0, 0.4, 1.0, 1.4], [[0.0], [0.08], [0.32], [0.34]]))
@@ -59,7 +60,7 @@ def test_friction_law_beyond_its_range_is_a_warning(real: Drive):
     go_home(real)
 
 
-def test_an_axis_that_leaves_its_travel_limits_is_logged(real: Drive):
+def test_an_axis_that_leaves_its_travel_limits_is_logged(real: AxesClient):
     """Nearly full speed close to a travel limit, so that the axis cannot stop before it."""
     assert real.process is not None
     go_home(real)
@@ -72,7 +73,7 @@ def test_an_axis_that_leaves_its_travel_limits_is_logged(real: Drive):
     real.wait_for(lambda: "x has left its travel limits" in process.output(), 5, "a line of the log")
 
 
-def test_the_description_has_every_key_and_no_other(real: Drive):
+def test_the_description_has_every_key_and_no_other(real: AxesClient):
     """Keys by status, in their order; test_record.py has the status of a recording."""
     described = {kind["status"]: [row["key"] for row in kind["keys"]] for kind in printed("interface")["diagnostics"]}
     assert described.pop("NODE: recording") == RECORDING_KEYS
@@ -83,7 +84,7 @@ def test_the_description_has_every_key_and_no_other(real: Drive):
     assert set(described) == {"NODE: axes", "NODE: JOINT"}
 
 
-def test_endpoints_are_counted_and_memory_is_reported(real: Drive):
+def test_endpoints_are_counted_and_memory_is_reported(real: AxesClient):
     """Each remote endpoint counts once, also after it has left; memory equals Linux's figure of the process."""
 
     def count() -> int:

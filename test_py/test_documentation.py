@@ -11,7 +11,7 @@ import pytest
 
 from documentation import Page, PageError, difference, read
 from documentation.place import ROOT, Place
-from drive import DomainId, node_binary
+from node_process import DomainId, node_binary
 
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs" / "tutorials").glob("*.md"))]
 PARTLY = sorted((ROOT / "docs" / "how-to").glob("*.md"))

@@ -15,16 +15,17 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from virtual_axes.msg import TrajectoryResult
 
-from drive import NANOSECONDS, TSP_NS, DomainId, Drive, Node, joint_trajectory, status_values, to_ns
 from motion import swing
+from node_process import DomainId, Node
 from sim_clock import SimClock
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, status_values, to_ns
 
 DEEP = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE)
 LONG = 30.0
 """Duration of a motion that would take long in real time, s."""
 
 
-def test_fast_outruns_the_wall_clock_on_an_unbroken_grid(start: Callable[..., Drive]):
+def test_fast_outruns_the_wall_clock_on_an_unbroken_grid(start: Callable[..., AxesClient]):
     """Half a minute of motion; the clock and the samples contain each position cycle once."""
     drive = start("-p", "time:=fast")
     ticks: list[int] = []
@@ -43,7 +44,7 @@ def test_fast_outruns_the_wall_clock_on_an_unbroken_grid(start: Callable[..., Dr
     np.testing.assert_array_equal(shown, recording.joints.stamp)
 
 
-def test_an_idle_fast_node_runs_at_wall_clock_rate(start: Callable[..., Drive]):
+def test_an_idle_fast_node_runs_at_wall_clock_rate(start: Callable[..., AxesClient]):
     """The clock of an idle node runs at wall-clock rate."""
     drive = start("-p", "time:=fast")
     before, began = drive.now(), time.monotonic()
@@ -59,9 +60,9 @@ def node(stack: ExitStack, name: str, domain: DomainId, *ros_args: str) -> Node:
     return stack.enter_context(Node(arguments, name=f"/{name}/virtual_axes", domain_id=domain.value))
 
 
-def machine(stack: ExitStack, name: str, domain: DomainId, *ros_args: str) -> Drive:
-    """Starts a machine in a shared domain and returns its Drive."""
-    return stack.enter_context(Drive(process=node(stack, name, domain, *ros_args)))
+def machine(stack: ExitStack, name: str, domain: DomainId, *ros_args: str) -> AxesClient:
+    """Starts a machine in a shared domain and returns its AxesClient."""
+    return stack.enter_context(AxesClient(process=node(stack, name, domain, *ros_args)))
 
 
 def wait_for_topics(process: Node) -> None:
@@ -75,8 +76,8 @@ def wait_for_topics(process: Node) -> None:
 class Ticks:
     """Messages on /clock, in order of arrival."""
 
-    def __init__(self, drive: Drive):
-        """Subscribes with the node of a Drive."""
+    def __init__(self, drive: AxesClient):
+        """Subscribes with the node of a AxesClient."""
         self.shown: list[int] = []
         self._drive = drive
         drive.node.create_subscription(Clock, "/clock", lambda message: self.shown.append(to_ns(message.clock)), DEEP)
@@ -97,13 +98,13 @@ def shared() -> Iterator[tuple[ExitStack, DomainId]]:
         yield stack, domain
 
 
-def leads(drive: Drive) -> bool:
+def leads(drive: AxesClient) -> bool:
     """Returns true if a machine publishes the clock, by its log."""
     lines = [line for line in drive.process.output().splitlines() if "/clock:" in line]
     return bool(lines) and lines[-1].endswith("publishing it")
 
 
-def assert_unbroken(drive: Drive, begin: int, end: int) -> None:
+def assert_unbroken(drive: AxesClient, begin: int, end: int) -> None:
     """Asserts that all position cycles between two times exist, ns."""
     drive.wait_until(end // TSP_NS * TSP_NS, 30)
     stamps = drive.record(begin, end).joints.stamp
@@ -148,7 +149,7 @@ def test_of_machines_that_start_together_one_leads(shared: tuple[ExitStack, Doma
     processes = [node(stack, name, domain) for name in ("left", "right")]
     for process in processes:
         wait_for_topics(process)
-    both = [stack.enter_context(Drive(process=process)) for process in processes]
+    both = [stack.enter_context(AxesClient(process=process)) for process in processes]
     both[0].wait_for(lambda: sum(map(leads, both)) == 1, 5, "one machine that publishes the clock")
     ticks = Ticks(both[0])
     count = len(ticks.shown)
@@ -157,7 +158,7 @@ def test_of_machines_that_start_together_one_leads(shared: tuple[ExitStack, Doma
     assert sum(map(leads, both)) == 1
 
 
-def test_an_external_clock_is_followed(start: Callable[..., Drive]):
+def test_an_external_clock_is_followed(start: Callable[..., AxesClient]):
     """Another publisher of /clock has priority; after it has left, the machine continues from its own time."""
     drive = start("-p", "time:=fast")
     ticks = Ticks(drive)
@@ -181,7 +182,7 @@ def test_an_external_clock_is_followed(start: Callable[..., Drive]):
     assert_unbroken(drive, begin, drive.now() - NANOSECONDS // 20)
 
 
-def stalled_at(drive: Drive, timeout: float = 60.0) -> int:
+def stalled_at(drive: AxesClient, timeout: float = 60.0) -> int:
     """Returns the number of position cycles at which a slow subscriber has stopped the clock for seconds."""
     seen = len(drive.diagnostics())
 
@@ -194,7 +195,7 @@ def stalled_at(drive: Drive, timeout: float = 60.0) -> int:
     return int(drive.wait_for(counts, timeout, "stalled clock")[0])
 
 
-def test_a_slow_subscriber_loses_no_sample(start: Callable[..., Drive]):
+def test_a_slow_subscriber_loses_no_sample(start: Callable[..., AxesClient]):
     """A keep-all subscriber that takes no samples for a while stops the clock, not the services."""
     # Depth of its middleware (5000), of the node's history for it (8192), and a margin.
     instants = 14_000

@@ -12,9 +12,10 @@ from rclpy.qos import ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from virtual_axes.msg import TrajectoryResult as R
 
-from drive import NANOSECONDS, TSP_NS, Drive, Node, joint_trajectory, to_ns
 from motion import assert_psec, swing
+from node_process import Node
 from sim_clock import SimClock
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, to_ns
 
 BEGIN = 1_000 * NANOSECONDS
 APART = 3_600 * NANOSECONDS
@@ -26,13 +27,13 @@ LINES_A_SECOND = 55
 @pytest.fixture(scope="module")
 def clock() -> Iterator[SimClock]:
     """Yields axes that follow a clock under test control, shared by the module."""
-    with Node(["-p", "use_sim_time:=true"]) as process, Drive(process=process, connect=False) as drive:
+    with Node(["-p", "use_sim_time:=true"]) as process, AxesClient(process=process, connect=False) as drive:
         clock = SimClock(drive, BEGIN, ReliabilityPolicy.RELIABLE)
         clock.connect()
         yield clock
 
 
-def jumps(drive: Drive) -> int:
+def jumps(drive: AxesClient) -> int:
     """Returns the number of jumps that the node has counted, from the next diagnostics."""
     return int(drive.next_status()["clock_jumps"])
 

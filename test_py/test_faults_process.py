@@ -13,8 +13,9 @@ from action_msgs.msg import GoalStatus
 from sensor_msgs.msg import JointState
 
 from action import Follow, goal, line
-from drive import NANOSECONDS, TSP_NS, Drive, Node, joint_trajectory, status_values, to_ns
 from motion import assert_psec, go_home, start_swing, swing
+from node_process import Node
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, status_values, to_ns
 
 PAUSE_S = 5
 SHALLOW = 10
@@ -27,12 +28,12 @@ RECOVERY_S = 30.0
 Answer = TypeVar("Answer")
 
 
-def diagnostics(drive: Drive) -> list[dict[str, str]]:
+def diagnostics(drive: AxesClient) -> list[dict[str, str]]:
     """Returns the values of all diagnostics so far."""
     return [status_values(array.status[0]) for array in drive.diagnostics()]
 
 
-def test_a_paused_node_continues_without_a_burst(real: Drive):
+def test_a_paused_node_continues_without_a_burst(real: AxesClient):
     """Missed cycles are counted and reported, the motion stays on schedule, services respond as before."""
     go_home(real)
     assert real.process is not None
@@ -99,7 +100,7 @@ def recovers(act: Callable[[], Answer]) -> Answer:
 
 def test_existing_participants_work_with_a_node_that_was_killed_and_started_again():
     """Existing publishers, subscribers, service clients and action clients work without a restart."""
-    with Node(["-p", "max_points:=20000"]) as process, Drive(process=process) as drive, Follow(drive) as follow:
+    with Node(["-p", "max_points:=20000"]) as process, AxesClient(process=process) as drive, Follow(drive) as follow:
         drive.set_parameters({"x.velocity_loop.gain": 4.9})
         assert follow.send(goal(line(["x"], [0.001], 0.2))).status() == GoalStatus.STATUS_SUCCEEDED
         drive.reset()

@@ -19,9 +19,10 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from virtual_axes.msg import TrajectoryResult as R
 
-from drive import TSP_NS, Drive, Node, joint_trajectory, parameter_messages, resident_mb, to_ns
 from motion import TSP, assert_psec, go_home, start_swing, swing
+from node_process import Node, resident_mb
 from participant import Participant, long_trajectory
+from virtual_axes_py.ros import TSP_NS, AxesClient, joint_trajectory, parameter_messages, to_ns
 
 POINTS = 500_000
 MESSAGE_MB = 20
@@ -37,19 +38,19 @@ GROWTH_MB = 30.0
 
 
 @pytest.fixture(scope="module")
-def node() -> Iterator[Drive]:
+def node() -> Iterator[AxesClient]:
     """Yields real-time axes that accept trajectories of any length, shared by the module."""
-    with Node() as process, Drive(process=process) as drive:
+    with Node() as process, AxesClient(process=process) as drive:
         yield drive
 
 
-def pid_of(drive: Drive) -> int:
+def pid_of(drive: AxesClient) -> int:
     """Returns the process id of the node."""
     assert drive.process is not None
     return drive.process.pid
 
 
-def kill_while_sending(drive: Drive, folder: Path) -> bool:
+def kill_while_sending(drive: AxesClient, folder: Path) -> bool:
     """Kills a publisher when the node has begun to assemble its message; returns true if the node had begun."""
     pid, decided = pid_of(drive), len(drive.results())
     with Participant(drive.process.domain_id, "send", POINTS, lease=2, folder=folder) as sender:
@@ -65,7 +66,7 @@ def kill_while_sending(drive: Drive, folder: Path) -> bool:
     return len(drive.results()) == decided and begun
 
 
-def test_a_publisher_killed_within_a_message_does_not_affect_others(node: Drive, tmp_path: Path):
+def test_a_publisher_killed_within_a_message_does_not_affect_others(node: AxesClient, tmp_path: Path):
     """The next publisher's trajectory is executed bit-identically; received fragments of the message stay in memory."""
     time_s, position = swing(1.2)
     motion = joint_trajectory(["x", "c"], time_s, np.column_stack([position, 3 * position]))
@@ -83,7 +84,7 @@ def test_a_publisher_killed_within_a_message_does_not_affect_others(node: Drive,
     assert resident_mb(pid_of(node)) < memory + 3 * MESSAGE_MB * attempts
 
 
-def test_a_trajectory_of_500_000_points_does_not_disturb_the_motion_under_way(node: Drive):
+def test_a_trajectory_of_500_000_points_does_not_disturb_the_motion_under_way(node: AxesClient):
     """The trajectory is accepted, and the active motion continues bit for bit; its memory is released afterwards."""
     go_home(node)
     memory = resident_mb(pid_of(node))
@@ -109,7 +110,7 @@ def flood(publisher: Any, message: Any, number: int) -> float:
     return time.monotonic() - begin
 
 
-def forget_results(drive: Drive) -> None:
+def forget_results(drive: AxesClient) -> None:
     """Drops the results of a flood after the last has arrived: searching thousands of results takes long."""
     silent_since, known = time.monotonic(), -1
     deadline = silent_since + 30
@@ -121,7 +122,7 @@ def forget_results(drive: Drive) -> None:
         drive._results.clear()
 
 
-def move_through(drive: Drive, act: Callable[[], None]) -> str:
+def move_through(drive: AxesClient, act: Callable[[], None]) -> str:
     """Runs a swing of Z during `act`, checks psec and the log length, and returns the log."""
     go_home(drive)
     logged_before = len(drive.process.output())
@@ -152,7 +153,7 @@ FLOODS = {
 
 
 @pytest.mark.parametrize("what", FLOODS)
-def test_a_flood_of_10_000_messages_a_second(node: Drive, what: str):
+def test_a_flood_of_10_000_messages_a_second(node: AxesClient, what: str):
     """The active motion is undisturbed, memory and log are bounded, and commands are accepted as before."""
     publisher, message = FLOODS[what]
     rejected = int(node.next_status()["stream_setpoints_rejected"])
@@ -183,7 +184,7 @@ def test_a_flood_of_10_000_messages_a_second(node: Drive, what: str):
     assert_psec(node, recording.start, {"y": position})
 
 
-def test_a_flood_of_service_calls(node: Drive):
+def test_a_flood_of_service_calls(node: AxesClient):
     """Thousands of simultaneous calls of two services: the last calls get a response, and memory does not grow."""
     memory = resident_mb(pid_of(node))
     deep = QoSProfile(depth=FLOOD)
@@ -206,7 +207,7 @@ def test_a_flood_of_service_calls(node: Drive):
     assert resident_mb(pid_of(node)) - memory < GROWTH_MB
 
 
-def test_parameters_can_be_set_while_a_stream_floods_the_node(node: Drive):
+def test_parameters_can_be_set_while_a_stream_floods_the_node(node: AxesClient):
     """No parameter is rejected because of a full command queue."""
     go_home(node)
     ended = threading.Event()
@@ -231,10 +232,10 @@ def test_parameters_can_be_set_while_a_stream_floods_the_node(node: Drive):
     node.set_parameters({"x.velocity_loop.gain": 5.0})
 
 
-def test_of_two_contending_publishers_the_newest_commands_the_joint(node: Drive):
+def test_of_two_contending_publishers_the_newest_commands_the_joint(node: AxesClient):
     """Each instant belongs to one trajectory, complete from its start until the next start; each has a result."""
     go_home(node)
-    with Drive(process=node.process) as other:
+    with AxesClient(process=node.process) as other:
         plans: dict[int, tuple[str, np.ndarray]] = {}
         begin = node.now()
         results = []
@@ -259,10 +260,10 @@ def test_of_two_contending_publishers_the_newest_commands_the_joint(node: Drive)
         assert x == -y
 
 
-def test_messages_of_two_contending_streams_are_not_mixed(node: Drive):
+def test_messages_of_two_contending_streams_are_not_mixed(node: AxesClient):
     """The joints of one message are commanded together: the last message of a cycle counts."""
     go_home(node)
-    with Drive(process=node.process) as other:
+    with AxesClient(process=node.process) as other:
         begin = node.now()
         sent: list[tuple[float, float]] = [(0.0, 0.0)]
         turns = random.Random(8)

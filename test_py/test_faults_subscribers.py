@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from drive import NANOSECONDS, TSP_NS, Drive, joint_trajectory, resident_mb, status_values
 from motion import assert_psec, go_home, start_swing
+from node_process import resident_mb
 from participant import Participant
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, status_values
 
 STOPPED_S = 20
 LEASE_S = 60
@@ -27,7 +28,7 @@ GROWTH_MB = 24.0
 """Maximum memory of 20 s of unread samples of a topic, MB, including discovery data."""
 
 
-def test_killed_and_stopped_subscribers_do_not_affect_others(real: Drive, tmp_path: Path):
+def test_killed_and_stopped_subscribers_do_not_affect_others(real: AxesClient, tmp_path: Path):
     """The axes move in real time, others lose no sample, memory is bounded; later each gets its history depth."""
     go_home(real)
     assert real.process is not None
@@ -72,7 +73,9 @@ def test_killed_and_stopped_subscribers_do_not_affect_others(real: Drive, tmp_pa
         assert real.end(accepted.sequence_number, 10).status == 2
 
 
-def test_a_subscriber_that_was_silent_beyond_its_lease_is_matched_again(start: Callable[..., Drive], tmp_path: Path):
+def test_a_subscriber_that_was_silent_beyond_its_lease_is_matched_again(
+    start: Callable[..., AxesClient], tmp_path: Path
+):
     """It receives each sample after the match, of the old writer and the next one, and so does another subscriber."""
     drive = start()
     assert drive.process is not None
@@ -98,7 +101,7 @@ def test_a_subscriber_that_was_silent_beyond_its_lease_is_matched_again(start: C
         assert set(np.diff(drive.record(stopped, int(stamps[-1])).joints.stamp)) == {TSP_NS}
 
 
-def test_shallow_subscribers_do_not_stall_fast_axes(start: Callable[..., Drive]):
+def test_shallow_subscribers_do_not_stall_fast_axes(start: Callable[..., AxesClient]):
     """Depth as of `ros2 topic echo`: a sample lost before it reaches such a reader is lost without notice."""
     drive = start("-p", "time:=fast")
     assert drive.process is not None

@@ -11,8 +11,8 @@ from control_msgs.msg import JointTrajectoryControllerState, SpeedScalingFactor
 from std_srvs.srv import Trigger
 from virtual_axes.msg import TrajectoryResult as R
 
-from drive import NANOSECONDS, TSP_NS, Drive, joint_trajectory, to_ns
 from motion import TSP, go_home, swing
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, to_ns
 
 ACCELERATION, JERK = 2.5, 50.0
 """Limits of x and y of the default machine, m/s² and m/s³."""
@@ -21,7 +21,7 @@ ACCELERATION, JERK = 2.5, 50.0
 class Feed:
     """Feed override of a node."""
 
-    def __init__(self, drive: Drive):
+    def __init__(self, drive: AxesClient):
         """Waits for the node's subscription and services."""
         self.drive = drive
         self.rates: list[tuple[int, float]] = []
@@ -53,7 +53,7 @@ class Feed:
 
 
 @pytest.fixture(scope="module")
-def feed(fast: Drive) -> Feed:
+def feed(fast: AxesClient) -> Feed:
     return Feed(fast)
 
 
@@ -71,7 +71,7 @@ def diagonal(duration: float, amplitude: float = 0.1):
     return joint_trajectory(["x", "y"], time, np.column_stack([x, x / 2])), x
 
 
-def execute(drive: Drive, trajectory):
+def execute(drive: AxesClient, trajectory):
     """Executes a trajectory to its end; returns the drive states from before its start to its end."""
     accepted = drive.accept(trajectory)
     ended = drive.end(accepted.sequence_number, 60)
@@ -170,7 +170,7 @@ def test_a_controlled_stop_ends_a_trajectory_in_a_feed_hold(feed: Feed) -> None:
 
 
 @pytest.mark.parametrize("factor", [-0.5, 2.5, math.nan, math.inf])
-def test_an_invalid_override_is_ignored_with_a_warning(start: Callable[..., Drive], factor: float) -> None:
+def test_an_invalid_override_is_ignored_with_a_warning(start: Callable[..., AxesClient], factor: float) -> None:
     drive = start("-p", "time:=fast")
     feed = Feed(drive)
     feed.publish(0.5)

@@ -6,14 +6,15 @@ import signal
 
 from sensor_msgs.msg import JointState
 
-from drive import Drive, Node
 from interface import interfaces
+from node_process import Node
+from virtual_axes_py.ros import AxesClient
 
 
-def of_the_node(drive: Drive) -> set[str]:
+def of_the_node(drive: AxesClient) -> set[str]:
     """Returns topics and services of the node by name."""
     namespace, name = drive.target.rsplit("/", 1)
-    if not drive.sees():
+    if not drive.is_in_graph():
         return set()
     ask = drive.node
     return {
@@ -33,7 +34,7 @@ def test_appears_and_disappears_within_two_seconds():
     rows = [row for row in interfaces() if not row.conditions and row.direction != "action"]
     wanted = {row.resolved(process.name, {}) for row in rows}
     try:
-        with Drive(process=process, connect=False) as drive:
+        with AxesClient(process=process, connect=False) as drive:
             process.start()
             drive.wait_for(lambda: wanted <= of_the_node(drive), 2, "complete node in the graph")
             drive.process = None
@@ -50,12 +51,12 @@ def test_appears_and_disappears_within_two_seconds():
                 ]
                 return endpoints + [name for name, _ in ask.get_service_names_and_types() if drive.target in name]
 
-            drive.wait_for(lambda: not drive.sees() and not left(), 2, "end of the node")
+            drive.wait_for(lambda: not drive.is_in_graph() and not left(), 2, "end of the node")
     finally:
         process.__exit__()
 
 
-def test_type_hash_is_not_sent(fast: Drive):
+def test_type_hash_is_not_sent(fast: AxesClient):
     """Limit of RustDDS (docs/internals/middleware.md). If this test fails, compare the hash with rclpy's."""
     fast.node.create_publisher(JointState, "/joint_states", 10)
     hashes = fast.wait_for(

@@ -19,8 +19,9 @@ from mcap.writer import CompressionType, Writer
 from rclpy.serialization import serialize_message
 from virtual_axes.msg import DriveStates, MotorCurrents
 
-from drive import Drive, Node, Recording, joint_trajectory, node_binary, to_time
 from motion import go_home
+from node_process import Node, node_binary
+from virtual_axes_py.ros import AxesClient, Recording, joint_trajectory, to_time
 
 AXES = ("x", "y", "z", "a", "c")
 LINEAR = ("x", "y", "z")
@@ -138,7 +139,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Returns the three parts of the campaign, all axes in each."""
     folder = tmp_path_factory.mktemp("campaign")
     files = []
-    with Node(["-p", "time:=fast"]) as process, Drive(process=process) as drive:
+    with Node(["-p", "time:=fast"]) as process, AxesClient(process=process) as drive:
         for seed, part in enumerate(PARTS):
             time, psec = campaign(part, folder)
             go_home(drive)

@@ -10,7 +10,8 @@ from rcl_interfaces.srv import DescribeParameters
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 
-from drive import SETTLE_S, Drive, own_mb
+from node_process import own_mb
+from virtual_axes_py.ros import SETTLE_S, AxesClient
 
 TIMES = 20
 MANY = 300
@@ -19,7 +20,7 @@ CLEANING_S = 7
 """Period of the middleware's history cleanup, s."""
 
 
-def describe_all(drive: Drive, times: int) -> int:
+def describe_all(drive: AxesClient, times: int) -> int:
     """Requests all parameter descriptions, checks them, and returns the number of octets."""
     names = drive.list_parameters()
     octets = 0
@@ -32,21 +33,21 @@ def describe_all(drive: Drive, times: int) -> int:
     return octets
 
 
-def test_many_in_a_row(real: Drive):
+def test_many_in_a_row(real: AxesClient):
     """Each response takes milliseconds, without retransmission."""
     describe_all(real, TIMES)
 
 
-def test_every_value_at_once(real: Drive):
+def test_every_value_at_once(real: AxesClient):
     """The request of `ros2 param dump`."""
     names = real.list_parameters()
     for _ in range(TIMES):
         assert len(real.get_parameters(names)) == len(names)
 
 
-def test_two_clients_at_once(real: Drive):
+def test_two_clients_at_once(real: AxesClient):
     """The responses to one client are samples that the other client must account for."""
-    with Drive(process=real.process) as other, ThreadPoolExecutor() as pool:
+    with AxesClient(process=real.process) as other, ThreadPoolExecutor() as pool:
         for done in [pool.submit(describe_all, drive, TIMES) for drive in (real, other)]:
             done.result()
         # And an idle client that had matched earlier.
@@ -54,7 +55,7 @@ def test_two_clients_at_once(real: Drive):
         assert len(real.describe(["max_points"])) == 1
 
 
-def test_a_hundred_requests_at_a_time(real: Drive):
+def test_a_hundred_requests_at_a_time(real: AxesClient):
     """A hundred responses in transit at a time, to a client with a sufficient history depth."""
     names = real.list_parameters()
     client = real.node.create_client(
@@ -70,7 +71,7 @@ def test_a_hundred_requests_at_a_time(real: Drive):
     assert all(len(future.result().descriptors) == len(names) for future in futures)
 
 
-def test_a_response_that_is_too_long_is_logged(real: Drive):
+def test_a_response_that_is_too_long_is_logged(real: AxesClient):
     """A datagram holds 65 500 octets; the log names the service, and the next response is sent."""
     names = (real.list_parameters() * 4)[:1000]
     with pytest.raises(TimeoutError):
@@ -79,7 +80,7 @@ def test_a_response_that_is_too_long_is_logged(real: Drive):
     assert len(real.describe(["max_points"])) == 1
 
 
-def test_responses_that_were_taken_are_forgotten(real: Drive):
+def test_responses_that_were_taken_are_forgotten(real: AxesClient):
     """Hundreds of long responses do not stay in the node's memory.
 
     The last 1000 requests do, which are some 10 kB each, with what came in between.

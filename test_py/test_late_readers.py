@@ -14,7 +14,8 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 
-from drive import DEEP_QOS, TSP_NS, Drive, Node, joint_trajectory, own_mb, stamp_of
+from node_process import Node, own_mb
+from virtual_axes_py.ros import DEEP_QOS, TSP_NS, AxesClient, joint_trajectory, stamp_of
 
 TOPIC = "/joint_states"
 MANY = 1 << 19
@@ -69,7 +70,7 @@ class Joining:
 
 def test_a_late_reader_costs_no_more_after_half_a_million_samples():
     """The topic has a new writer by then; a subscriber loses nothing, has no duplicates, and keeps the order."""
-    with Node(["-p", "time:=fast"]) as process, Drive(process=process, listen=False) as drive:
+    with Node(["-p", "time:=fast"]) as process, AxesClient(process=process, keep_samples=False) as drive:
         with pytest.raises(ValueError, match="keeps no samples"):
             drive.record(0, TSP_NS)
 

@@ -16,8 +16,9 @@ from launch_ros import substitutions
 from launch_ros.actions import Node as NodeAction
 from urdf_parser_py.urdf import URDF
 
-from drive import Drive, Node, joint_trajectory, node_binary
 from launch_graph import ROOT, actions, by_executable, description, nodes
+from node_process import Node, node_binary
+from virtual_axes_py.ros import AxesClient, joint_trajectory
 
 ONE, TWO = "virtual_axes.launch.py", "two_machines.launch.py"
 
@@ -163,7 +164,7 @@ def test_the_node_runs_with_the_arguments_from_launch():
         ONE, namespace="cell", name="mill", joint_prefix="m_", controller="gpc", robot_state_publisher="false"
     )
     with ExitStack() as stack:
-        drive = stack.enter_context(Drive(process=process(node, stack)))
+        drive = stack.enter_context(AxesClient(process=process(node, stack)))
         assert set(drive.latest("controller").values()) == {"gpc"}
         assert sorted(drive.latest()) == [f"m_{joint}" for joint in "acxyz"]
         assert drive.get_parameters(["workpiece_frame"]) == {"workpiece_frame": "workpiece"}
@@ -185,7 +186,7 @@ def test_two_machines_run_in_one_domain():
     with ExitStack() as stack:
         first = process(left, stack)
         second = process(right, stack, first.domain_id)
-        drives = [stack.enter_context(Drive(process=started)) for started in (first, second)]
+        drives = [stack.enter_context(AxesClient(process=started)) for started in (first, second)]
         assert [set(drive.latest("controller").values()) for drive in drives] == [{"cascade"}, {"gpc"}]
         poses: list[PoseStamped] = []
         drives[1].node.create_subscription(PoseStamped, "/right/virtual_axes/tool_pose", poses.append, 10)

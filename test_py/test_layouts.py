@@ -13,8 +13,8 @@ import pytest
 import yaml
 from urdf_parser_py.urdf import URDF
 
-from drive import Drive
 from launch_graph import by_executable, nodes
+from virtual_axes_py.ros import AxesClient
 
 ROOT = Path(__file__).resolve().parent.parent
 JOINTS = 5
@@ -23,7 +23,7 @@ FRAMES = {"machine", "workpiece", "tool"}
 
 
 @pytest.fixture(scope="module")
-def topics(real: Drive) -> dict[str, str]:
+def topics(real: AxesClient) -> dict[str, str]:
     """Returns the types of the node's topics."""
 
     def listed() -> dict[str, str]:

@@ -8,15 +8,15 @@ import time
 import numpy as np
 import pytest
 
-from drive import NANOSECONDS, TSP_NS, Drive
 from motion import RATIO, go_home
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient
 
 TORQUE_CONSTANT = 2.64
 FORCE = 2000.0
 """Load, N, above static friction: 2.41 A against 1.04 A."""
 
 
-def test_load_moves_the_axis_and_times_out(real: Drive):
+def test_load_moves_the_axis_and_times_out(real: AxesClient):
     """A positive load pushes in the positive direction against the motor; it ends 0.1 s after the last message."""
     go_home(real)
     begin = real.now()
@@ -37,7 +37,7 @@ def test_load_moves_the_axis_and_times_out(real: Drive):
     assert np.abs(recording.joints["position", "x"]).max() < 1e-3
 
 
-def test_load_of_an_unknown_joint_is_ignored(real: Drive):
+def test_load_of_an_unknown_joint_is_ignored(real: AxesClient):
     """The message is ignored; the axes stay where they are."""
     go_home(real)
     before = real.latest("position")

@@ -21,7 +21,8 @@ from rcl_interfaces.srv import DescribeParameters
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 
-from drive import Drive, Node, joint_trajectory
+from node_process import Node
+from virtual_axes_py.ros import AxesClient, joint_trajectory
 
 ROSOUT_QOS = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PIPE_BYTES = 4096
@@ -30,14 +31,14 @@ IN_THE_CELL = ("-r", "__ns:=/cell", "-r", "__node:=mill")
 LINE = re.compile(r"\[(?P<level>[A-Z]+)\] \[(?P<stamp>\d+\.\d{9})\] \[(?P<logger>[\w.]+)\]: (?P<text>.*)")
 
 
-def rosout(drive: Drive) -> list[Log]:
+def rosout(drive: AxesClient) -> list[Log]:
     """Returns the messages on /rosout from now on, and those kept for late joiners."""
     found: list[Log] = []
     drive.node.create_subscription(Log, "/rosout", found.append, ROSOUT_QOS)
     return found
 
 
-def reject_one(drive: Drive) -> None:
+def reject_one(drive: AxesClient) -> None:
     """Sends a trajectory that is rejected, which is logged as a warning."""
     result = drive.decision(drive.send(joint_trajectory(["no_such_joint"], [1.0], [[0.0]])))
     assert result.code != 0
@@ -52,7 +53,7 @@ def lines(process: Node) -> list[re.Match[str]]:
     return [match for match in found if match]
 
 
-def test_levels_logger_and_time(start: Callable[..., Drive]):
+def test_levels_logger_and_time(start: Callable[..., AxesClient]):
     """INFO 20, WARN 30, ERROR 40, with the logger name that rclpy uses for this node, also for late joiners."""
     drive = start(*IN_THE_CELL, "-p", "time:=fast", name="/cell/mill")
     process = drive.process
@@ -85,7 +86,7 @@ def test_levels_logger_and_time(start: Callable[..., Drive]):
         assert began - 1 <= stamp <= time.time()
 
 
-def test_level_of_one_logger(start: Callable[..., Drive]):
+def test_level_of_one_logger(start: Callable[..., AxesClient]):
     """--log-level name:=level applies to the terminal and to /rosout."""
     drive = start(*IN_THE_CELL, "--log-level", "cell.mill:=error", name="/cell/mill")
     found = rosout(drive)
@@ -95,7 +96,7 @@ def test_level_of_one_logger(start: Callable[..., Drive]):
     assert found == [] and lines(drive.process) == []
 
 
-def test_a_duplicate_node_name_is_logged(start: Callable[..., Drive]):
+def test_a_duplicate_node_name_is_logged(start: Callable[..., AxesClient]):
     """Each of the two logs it once, and only if the namespace is equal, too."""
     first = start(*IN_THE_CELL, name="/cell/mill")
     domain = first.process.domain_id
@@ -150,7 +151,7 @@ def killed_participant(domain_id: int, profile: Path, failures: list[Any]) -> No
         failures.append(ready)
 
 
-def test_the_middleware_is_quiet(start: Callable[..., Drive], tmp_path: Path):
+def test_the_middleware_is_quiet(start: Callable[..., AxesClient], tmp_path: Path):
     """From start to end, while participants join, leave, and are killed."""
     drive = start()
     process = drive.process
@@ -164,7 +165,7 @@ def test_the_middleware_is_quiet(start: Callable[..., Drive], tmp_path: Path):
     for participant in participants:
         participant.start()
     for _ in range(3):
-        with Drive(process=process) as other:
+        with AxesClient(process=process) as other:
             other.list_parameters()
     for participant in participants:
         participant.join(30)
@@ -200,7 +201,7 @@ def test_a_full_stderr_pipe_does_not_stop_the_node():
     """stderr is a full pipe; a later reader finds the messages of the meantime."""
     with full_pipe() as (read, write):
         os.set_blocking(read, False)
-        with Node(stderr=write) as process, Drive(process=process) as drive:
+        with Node(stderr=write) as process, AxesClient(process=process) as drive:
             reject_one(drive)
             # The axes thread itself logs that it was late.
             os.kill(process.pid, signal.SIGSTOP)
@@ -225,5 +226,5 @@ def test_a_full_stderr_pipe_does_not_stop_the_node():
 def test_a_full_stderr_pipe_does_not_delay_the_end_of_the_node():
     """The node waits for a reader only for a short time."""
     with full_pipe() as (_, write):
-        with Node(stderr=write) as process, Drive(process=process):
+        with Node(stderr=write) as process, AxesClient(process=process):
             assert process.stop() == 0

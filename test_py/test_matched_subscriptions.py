@@ -8,7 +8,7 @@ import time
 from control_msgs.msg import JointTrajectoryControllerState
 from rclpy.subscription import Subscription
 
-from drive import TSP_NS, Drive, to_ns
+from virtual_axes_py.ros import TSP_NS, AxesClient, to_ns
 
 TOPIC = "/virtual_axes/controller_state"
 LOOKED_S = 2.5
@@ -16,7 +16,7 @@ LOOKED_S = 2.5
 SAMPLES = 50
 
 
-def test_each_subscriber_gets_an_unbroken_grid_of_samples(real: Drive):
+def test_each_subscriber_gets_an_unbroken_grid_of_samples(real: AxesClient):
     """The node's count of matched subscriptions must not cause lost samples."""
     for _ in range(2):
         stamps: list[int] = []

@@ -15,7 +15,8 @@ from mcap.writer import CompressionType
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer
 
-from drive import NANOSECONDS, TSP_NS, node_binary
+from node_process import node_binary
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS
 
 JOINTS = ["x", "y", "z", "a", "c"]
 TRACE_TYPES = {

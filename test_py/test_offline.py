@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drive import TSP_NS, Drive, Recording, joint_trajectory, node_binary
 from motion import swing
+from node_process import node_binary
+from virtual_axes_py.ros import TSP_NS, AxesClient, Recording, joint_trajectory
 
 AXES = ["x", "y", "z", "a", "c"]
 AMPLITUDES = [0.05, -0.03, 0.02, 0.4, 1.0]
@@ -57,7 +58,7 @@ def offline(tmp_path_factory: pytest.TempPathFactory) -> Offline:
     return run
 
 
-def record(drive: Drive, controller: str) -> Recording:
+def record(drive: AxesClient, controller: str) -> Recording:
     """Returns the recording of the plan, run by the node from home with a position controller."""
     drive.set_parameters_atomically({f"{axis}.position_loop.controller": controller for axis in AXES})
     drive.reset()

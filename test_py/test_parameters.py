@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from rcl_interfaces.msg import ParameterType
 
-from drive import TSP_NS, Drive, Node, ParameterRejected
 from motion import RATIO, TSP, go_home, start_swing
+from node_process import Node
+from virtual_axes_py.ros import TSP_NS, AxesClient, ParameterRejected
 
 GAIN = "x.velocity_loop.gain"
 NUMBERS = {ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_INTEGER}
@@ -29,7 +30,7 @@ MACHINE_KEYS = [
 ]
 
 
-def test_every_parameter_is_described(real: Drive):
+def test_every_parameter_is_described(real: AxesClient):
     """Each has a type and a text, and each number a range."""
     names = real.list_parameters()
     assert not [key for key in [GAIN, *MACHINE_KEYS] if key not in names]
@@ -43,7 +44,7 @@ def test_every_parameter_is_described(real: Drive):
             assert ranges[0].from_value < ranges[0].to_value, descriptor.name
 
 
-def test_values_are_those_of_the_default_machine(real: Drive):
+def test_values_are_those_of_the_default_machine(real: AxesClient):
     """Values have the units of CNC documentation."""
     assert real.get_parameters(
         [GAIN, "x.position_loop.gain", "x.transmission.screw_lead_mm", "periods.position_ms"]
@@ -56,7 +57,7 @@ def test_values_are_those_of_the_default_machine(real: Drive):
 
 
 @pytest.mark.parametrize("value", [-1.0, 1e12, float("nan"), float("inf")])
-def test_gain_out_of_range_is_rejected_with_a_reason(real: Drive, value: float):
+def test_gain_out_of_range_is_rejected_with_a_reason(real: AxesClient, value: float):
     """The old value stays."""
     with pytest.raises(ParameterRejected, match=r"gain"):
         real.set_parameters({GAIN: value})
@@ -64,21 +65,21 @@ def test_gain_out_of_range_is_rejected_with_a_reason(real: Drive, value: float):
 
 
 @pytest.mark.parametrize("value", ["5.0", True, [5.0]], ids=["string", "bool", "array"])
-def test_wrong_type_is_rejected_with_a_reason(real: Drive, value: object):
+def test_wrong_type_is_rejected_with_a_reason(real: AxesClient, value: object):
     """The old value stays."""
     with pytest.raises(ParameterRejected, match=r"\w"):
         real.set_parameters({GAIN: value})
     assert real.get_parameters([GAIN]) == {GAIN: 5.0}
 
 
-def test_unknown_parameter_is_rejected_with_a_reason(real: Drive):
+def test_unknown_parameter_is_rejected_with_a_reason(real: AxesClient):
     """An unknown parameter is not declared implicitly."""
     with pytest.raises(ParameterRejected, match=r"\w"):
         real.set_parameters({"x.velocity_loop.gian": 5.0})
 
 
 @pytest.mark.parametrize("name", ["periods.position_ms", "time"])
-def test_a_read_only_parameter_is_rejected_with_a_reason(real: Drive, name: str):
+def test_a_read_only_parameter_is_rejected_with_a_reason(real: AxesClient, name: str):
     """The parameter is fixed after the start; the reason names it."""
     before = real.get_parameters([name])
     with pytest.raises(ParameterRejected, match=name.rsplit(".", 1)[-1]):
@@ -86,7 +87,7 @@ def test_a_read_only_parameter_is_rejected_with_a_reason(real: Drive, name: str)
     assert real.get_parameters([name]) == before
 
 
-def test_live_gain_takes_effect(real: Drive):
+def test_live_gain_takes_effect(real: AxesClient):
     """An integer is accepted for a double, and the node uses the new value."""
     real.set_parameters({GAIN: 4})
     assert real.get_parameters([GAIN]) == {GAIN: 4.0}
@@ -94,7 +95,7 @@ def test_live_gain_takes_effect(real: Drive):
     assert real.get_parameters([GAIN]) == {GAIN: 5.0}
 
 
-def test_feedforward_can_be_halved_while_moving(real: Drive):
+def test_feedforward_can_be_halved_while_moving(real: AxesClient):
     """VFFWS is halved from one position cycle on."""
     go_home(real)
     sent, start, plan = start_swing(real, duration=6.0)
@@ -137,7 +138,7 @@ def test_an_argument_that_is_not_utf_8_is_rejected_and_no_panic():
         assert "is not UTF-8" in process.output()
 
 
-def test_arguments_are_applied(start: Callable[..., Drive], tmp_path):
+def test_arguments_are_applied(start: Callable[..., AxesClient], tmp_path):
     """-p, --params-file, names and namespaces, and -- as their end."""
     file = tmp_path / "machine.yaml"
     file.write_text("/**:\n  ros__parameters:\n    y:\n      velocity_loop:\n        gain: 4.25\n")
@@ -153,5 +154,5 @@ def test_arguments_are_applied(start: Callable[..., Drive], tmp_path):
         "--",
         name="/cell/axes",
     )
-    assert drive.sees("/cell/axes")
+    assert drive.is_in_graph("/cell/axes")
     assert drive.get_parameters([GAIN, "y.velocity_loop.gain"]) == {GAIN: 4.0, "y.velocity_loop.gain": 4.25}

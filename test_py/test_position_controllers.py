@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from virtual_axes.msg import TrajectoryResult as R
 
-from drive import TSP_NS, Drive, ParameterRejected, joint_trajectory, node_binary
 from motion import assert_psec, go_home, start_swing, swing
+from node_process import node_binary
+from virtual_axes_py.ros import TSP_NS, AxesClient, ParameterRejected, joint_trajectory
 
 LOOP = "x.position_loop"
 UNSTABLE = {"controller": "rst", "rst.r": [250.0], "rst.s": [1.0], "rst.t": [250.0]}
@@ -58,7 +59,7 @@ def design() -> dict[str, object]:
     ids=lambda value: ",".join(value) if isinstance(value, dict) else "",
 )
 def test_an_invalid_controller_is_rejected_and_the_motion_continues(
-    values: dict[str, object], words: list[str], real: Drive
+    values: dict[str, object], words: list[str], real: AxesClient
 ):
     """The reason has the key or the axis and the numbers; the configuration is unchanged."""
     go_home(real)
@@ -83,7 +84,7 @@ def test_an_invalid_controller_is_rejected_and_the_motion_continues(
     assert {result.status for result in real.results(accepted.sequence_number)} <= {R.ACCEPTED, R.COMPLETED}
 
 
-def test_an_unstable_loop_is_rejected_with_its_pole_unless_allowed(start: Callable[..., Drive]):
+def test_an_unstable_loop_is_rejected_with_its_pole_unless_allowed(start: Callable[..., AxesClient]):
     """The pole is that of A S + B R; with allow_unstable the axis oscillates."""
     drive = start()
     model = design()["model"]
@@ -115,7 +116,7 @@ def test_an_unstable_loop_is_rejected_with_its_pole_unless_allowed(start: Callab
     assert drive.get_parameters([f"{LOOP}.allow_unstable"]) == {f"{LOOP}.allow_unstable": False}
 
 
-def test_a_predictive_controller_equals_its_polynomials(start: Callable[..., Drive]):
+def test_a_predictive_controller_equals_its_polynomials(start: Callable[..., AxesClient]):
     """The polynomials of `virtual_axes design gpc` as arrays of doubles give the same bits as the design."""
     found = design()
     polynomials = {

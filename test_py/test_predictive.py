@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from virtual_axes.msg import TrajectoryResult as R
 
-from drive import TSP_NS, Drive, Node, Recording, ballbar, joint_trajectory, to_ns
 from motion import TSP, assert_psec, go_home
+from node_process import Node
+from virtual_axes_py.ros import TSP_NS, AxesClient, Recording, ballbar, joint_trajectory, to_ns
 
 AXES = ("x", "y")
 PATH = ballbar()
@@ -38,14 +39,14 @@ def tuning(n1: int, n2: int, nu: int, lambda_rel: float) -> dict[str, object]:
 
 
 @pytest.fixture(scope="module")
-def predictive() -> Iterator[Drive]:
+def predictive() -> Iterator[AxesClient]:
     """Yields X and Y with predictive control from the start on."""
     arguments = [word for axis in AXES for word in ("-p", f"{axis}.position_loop.controller:=gpc")]
-    with Node(["-p", "time:=fast", *arguments]) as process, Drive(process=process) as drive:
+    with Node(["-p", "time:=fast", *arguments]) as process, AxesClient(process=process) as drive:
         yield drive
 
 
-def run(drive: Drive) -> Recording:
+def run(drive: AxesClient) -> Recording:
     """Runs the circle once, from home."""
     go_home(drive)
     return drive.run(joint_trajectory(AXES, PATH.time, np.column_stack([PATH.x, PATH.y])))
@@ -57,7 +58,7 @@ def deviation_um(recording: Recording) -> np.ndarray:
 
 
 @pytest.mark.parametrize("row", ROWS, ids=str)
-def test_the_radial_deviation_is_close_to_zero(row: tuple[int, int, int, float], predictive: Drive):
+def test_the_radial_deviation_is_close_to_zero(row: tuple[int, int, int, float], predictive: AxesClient):
     """[P] figure 10, right: almost 0; with the preset at the start of the node, and by parameters."""
     if row == PRESET:
         assert predictive.get_parameters(list(tuning(*row))) == tuning(*row)
@@ -75,7 +76,7 @@ def test_the_radial_deviation_is_close_to_zero(row: tuple[int, int, int, float],
     assert largest - EXTREME_UM - BETWEEN_SAMPLES_UM <= deviation.max() <= largest + EXTREME_UM
 
 
-def test_the_drive_states_name_the_controller_of_each_axis(predictive: Drive):
+def test_the_drive_states_name_the_controller_of_each_axis(predictive: AxesClient):
     """The cascade's feedforward is off while a controller with preview is active."""
     states = run(predictive).states
     for axis, wanted in {"x": "gpc", "y": "gpc", "z": "cascade", "a": "cascade", "c": "cascade"}.items():
@@ -86,7 +87,7 @@ def test_the_drive_states_name_the_controller_of_each_axis(predictive: Drive):
         assert not states["torque_feedforward", axis].any()
 
 
-def test_compensated_friction_leaves_no_spikes(predictive: Drive):
+def test_compensated_friction_leaves_no_spikes(predictive: AxesClient):
     """The friction current of the setpoint velocity is fed forward, switched on while the node runs."""
     weights = [f"{axis}.feedforward.friction" for axis in AXES]
     assert np.abs(deviation_um(run(predictive))).max() > 2
@@ -113,14 +114,14 @@ STEADY_UM = {"cascade": (47.7, 68.6), "gpc": (-8.5, 13.2)}
 WIDENED_UM = 60.0
 
 
-def switch(drive: Drive, controller: str) -> None:
+def switch(drive: AxesClient, controller: str) -> None:
     """Switches the controller of both axes at one instant and waits for more than a turn."""
     drive.set_parameters_atomically(of_axes({"controller": controller}))
     drive.wait_for(lambda: drive.latest("controller")["x"] == controller, 10, f"controller {controller}")
     drive.wait_until(drive.now() + (TURN + SWITCH) * TSP_NS, 30)
 
 
-def test_switching_to_predictive_and_back_on_a_circle_is_bumpless(real: Drive):
+def test_switching_to_predictive_and_back_on_a_circle_is_bumpless(real: AxesClient):
     """Switched by parameter, at an arbitrary position on the circle."""
     go_home(real)
     accepted = real.accept(joint_trajectory(AXES, LONG.time, np.column_stack([LONG.x, LONG.y])))

@@ -10,7 +10,7 @@ import os
 import subprocess
 import sys
 
-from drive import Drive
+from virtual_axes_py.ros import AxesClient
 
 TIMES = 20
 
@@ -38,7 +38,7 @@ rclpy.shutdown()
 """
 
 
-def test_published_once_arrives_every_time(real: Drive):
+def test_published_once_arrives_every_time(real: AxesClient):
     """Each publisher names its own nonexistent joint: the rejections identify the messages that arrived."""
     env = {**os.environ, "ROS_DOMAIN_ID": str(real.process.domain_id)}
     publishers = []

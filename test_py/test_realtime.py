@@ -7,10 +7,10 @@ import time
 import numpy as np
 from sensor_msgs.msg import JointState
 
-from drive import DEEP_QOS, NANOSECONDS, TSP_NS, Drive, to_ns
+from virtual_axes_py.ros import DEEP_QOS, NANOSECONDS, TSP_NS, AxesClient, to_ns
 
 
-def test_ten_seconds_are_an_unbroken_grid(real: Drive):
+def test_ten_seconds_are_an_unbroken_grid(real: AxesClient):
     """Stamps are exactly 6 ms apart; their latency is printed and not asserted."""
     arrivals: list[tuple[int, int]] = []
 

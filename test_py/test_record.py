@@ -29,16 +29,15 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 from virtual_axes.msg import DriveStates, MotorCurrents, TrajectoryResult
 
-from drive import (
+from node_process import Node, node_binary
+from virtual_axes_py.ros import (
     DEEP_QOS,
     NANOSECONDS,
     RECORDING_KEYS,
     RESULT_QOS,
     TSP_NS,
-    Drive,
-    Node,
+    AxesClient,
     joint_trajectory,
-    node_binary,
     status_values,
 )
 
@@ -114,7 +113,7 @@ def stamps(entries: list[Entry]) -> np.ndarray:
     return np.array([entry.publish for entry in entries], dtype=np.int64)
 
 
-def recording_status(drive: Drive) -> DiagnosticStatus | None:
+def recording_status(drive: AxesClient) -> DiagnosticStatus | None:
     """Returns the newest diagnostics of the recording."""
     for message in reversed(drive.diagnostics()):
         for status in message.status:
@@ -142,7 +141,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
     """Yields a recording of a real-time node that is moved, streamed to, loaded, and ended by SIGTERM."""
     path = tmp_path_factory.mktemp("record") / "session.mcap"
     with Node(["-p", f"record:={path}", "-p", "qos.drive_states.depth:=7"]) as process:
-        drive = Drive(process=process)
+        drive = AxesClient(process=process)
         received_messages: dict[str, list[bytes]] = {
             topic: [] for topic in KINDS if topic not in ("/psec", SCALING, CURRENTS, DRIVES)
         }
@@ -180,7 +179,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
                 offered[topic] = (kind, reliability, durability)
         drive.process = None
         exit_status = process.stop(signal.SIGTERM)
-        drive.wait_for(lambda: not drive.sees(), 5, "dispose")
+        drive.wait_for(lambda: not drive.is_in_graph(), 5, "dispose")
         for topic, key in ((STATES, "joints"), (CURRENTS, "currents"), (DRIVES, "states")):
             received_messages[topic] = list(drive._samples[key])
         drive.close()
@@ -267,7 +266,9 @@ def test_the_command_reads_setpoints_from_the_recording(session: Session):
     assert done.returncode == 0, done.stderr
 
 
-def test_a_recording_of_a_killed_node_is_readable_up_to_its_last_chunk(start: Callable[..., Drive], tmp_path: Path):
+def test_a_recording_of_a_killed_node_is_readable_up_to_its_last_chunk(
+    start: Callable[..., AxesClient], tmp_path: Path
+):
     """SIGKILL: all messages up to it, unbroken; identify reads them and reports the truncation."""
     path = tmp_path / "killed.mcap"
     drive = start("-p", f"record:={path}")
@@ -288,7 +289,7 @@ def test_a_recording_of_a_killed_node_is_readable_up_to_its_last_chunk(start: Ca
     assert "its writer was terminated" in done.stdout + done.stderr
 
 
-def test_a_recording_ends_at_its_maximum_size_and_the_axes_continue(start: Callable[..., Drive], tmp_path: Path):
+def test_a_recording_ends_at_its_maximum_size_and_the_axes_continue(start: Callable[..., AxesClient], tmp_path: Path):
     """At 1 MB the file is closed, complete and reported; in `fast` no earlier message is missing."""
     path = tmp_path / "bounded.mcap"
     drive = start("-p", f"record:={path}", "-p", "record_max_mb:=1", "-p", "time:=fast")
@@ -327,7 +328,7 @@ def test_a_failed_write_ends_the_recording_but_not_the_node(tmp_path: Path):
     binary.write_text(f'#!/bin/bash\ntrap "" XFSZ\nulimit -f 200\nexec {node_binary()} "$@"\n')
     binary.chmod(binary.stat().st_mode | stat.S_IXUSR)
     ros_args = ["-p", f"record:={path}", "-p", "time:=fast"]
-    with Node(ros_args, binary=binary) as process, Drive(process=process) as drive:
+    with Node(ros_args, binary=binary) as process, AxesClient(process=process) as drive:
         noise = np.random.default_rng(1).uniform(-1e-4, 1e-4, (1500, 2))
         times = np.arange(1, len(noise) + 1) * (2 * TSP_NS / NANOSECONDS)
         result = drive.run(joint_trajectory(["x", "y"], times, noise), timeout=120).result
@@ -348,7 +349,7 @@ def test_a_failed_write_ends_the_recording_but_not_the_node(tmp_path: Path):
     again = tmp_path / "again.mcap"
     with (
         Node(["-p", f"record:={again}", "-p", "time:=fast"], binary=binary) as process,
-        Drive(process=process) as drive,
+        AxesClient(process=process) as drive,
     ):
         drive.wait_until(drive.now() + 100 * TSP_NS, 20)
         assert process.stop(signal.SIGTERM) == 0

@@ -21,8 +21,9 @@ from rclpy.action import graph
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from virtual_axes.msg import TrajectoryResult
 
-from drive import DEFAULT_NODE, Drive, Node, node_binary
 from interface import Interface, ParameterRow, interfaces, parameters, printed
+from node_process import DEFAULT_NODE, Node, node_binary
+from virtual_axes_py.ros import AxesClient
 
 ROOT = Path(__file__).resolve().parent.parent
 CONFIG = ROOT / "config"
@@ -83,10 +84,10 @@ HALT = {"halt": "/cell/halt"}
 
 
 @pytest.fixture(scope="module", params=RUNS)
-def seen(request: pytest.FixtureRequest) -> Iterator[tuple[Run, Drive]]:
+def seen(request: pytest.FixtureRequest) -> Iterator[tuple[Run, AxesClient]]:
     """Yields a node started in one of these ways, after all described interfaces exist."""
     run = RUNS[request.param]
-    with Node(run.ros_args, name=run.name) as process, Drive(process=process, connect=False) as drive:
+    with Node(run.ros_args, name=run.name) as process, AxesClient(process=process, connect=False) as drive:
         drive.wait_for(drive.sees, 10, "node in the graph")
         wanted = {HALT.get(name, name) for name in run.expected("in", "out", "service")}
 
@@ -101,7 +102,7 @@ def seen(request: pytest.FixtureRequest) -> Iterator[tuple[Run, Drive]]:
         yield run, drive
 
 
-def by_node(drive: Drive, what: str) -> dict[str, list[str]]:
+def by_node(drive: AxesClient, what: str) -> dict[str, list[str]]:
     """Returns names and types of the node's publishers, subscribers, services or clients."""
     namespace, name = drive.target.rsplit("/", 1)
     return dict(getattr(drive.node, f"get_{what}_names_and_types_by_node")(name, namespace or "/"))
@@ -125,13 +126,13 @@ def test_the_tested_conditions_are_the_described_ones():
 @pytest.mark.parametrize(
     ("direction", "what"), [("out", "publisher"), ("in", "subscriber"), ("service", "service")], ids=lambda value: value
 )
-def test_names_and_types(seen: tuple[Run, Drive], direction: str, what: str):
+def test_names_and_types(seen: tuple[Run, AxesClient], direction: str, what: str):
     """Documented names and types equal those of the graph."""
     run, drive = seen
     assert visible(by_node(drive, what)) == types_of(run.expected(direction))
 
 
-def test_actions(seen: tuple[Run, Drive]):
+def test_actions(seen: tuple[Run, AxesClient]):
     """Actions have their types; hidden topics and services are only theirs."""
     run, drive = seen
     namespace, name = run.name.rsplit("/", 1)
@@ -142,13 +143,13 @@ def test_actions(seen: tuple[Run, Drive]):
         assert hidden == {f"{action}{HIDDEN}{part}" for action in actions for part in parts}, what
 
 
-def test_the_node_has_no_service_client(seen: tuple[Run, Drive]):
+def test_the_node_has_no_service_client(seen: tuple[Run, AxesClient]):
     """The node has no service client."""
     _, drive = seen
     assert by_node(drive, "client") == {}
 
 
-def test_quality_of_service_and_node_name_of_every_endpoint(seen: tuple[Run, Drive]):
+def test_quality_of_service_and_node_name_of_every_endpoint(seen: tuple[Run, AxesClient]):
     """Reliability and durability are as documented; every endpoint has its node's name."""
     run, drive = seen
     infos: dict[str, Callable[[str], Any]] = {
@@ -171,7 +172,7 @@ def quality(info: Any) -> tuple[ReliabilityPolicy, DurabilityPolicy]:
     return info.qos_profile.reliability, info.qos_profile.durability
 
 
-def test_policies_are_those_of_the_parameters(seen: tuple[Run, Drive]):
+def test_policies_are_those_of_the_parameters(seen: tuple[Run, AxesClient]):
     """Described profiles equal the parameters that set them."""
     run, drive = seen
     profiles = [row.qos for row in run.expected("in", "out").values() if row.qos and row.qos["parameters"]]
@@ -180,7 +181,7 @@ def test_policies_are_those_of_the_parameters(seen: tuple[Run, Drive]):
     assert drive.get_parameters(list(documented)) == documented
 
 
-def test_the_screen_at_the_start(seen: tuple[Run, Drive]):
+def test_the_screen_at_the_start(seen: tuple[Run, AxesClient]):
     """The start screen lists the same topics, services and actions."""
     run, drive = seen
     lines = drive.wait_for(lambda: drive.process.output(), 5, "screen").splitlines()
@@ -211,7 +212,7 @@ class Machine:
 
 
 @pytest.fixture(scope="module")
-def machine(seen: tuple[Run, Drive]) -> Machine:
+def machine(seen: tuple[Run, AxesClient]) -> Machine:
     """Returns the parameters of the started node, from the description and from the file that it read."""
     run, drive = seen
     file = yaml.safe_load((run.machine or DEFAULT_MACHINE).read_text(encoding="utf-8"))
@@ -240,7 +241,7 @@ def kinds_of(joint: str, given: dict[str, Any]) -> set[str]:
     return {"axis", f"{axis} axis", "linear motor" if linear_motor else "rotary motor"}
 
 
-def test_parameter_names(seen: tuple[Run, Drive], machine: Machine):
+def test_parameter_names(seen: tuple[Run, AxesClient], machine: Machine):
     """Documented parameters equal those of the node."""
     assert sorted(seen[1].list_parameters()) == sorted(machine.rows)
 
@@ -255,7 +256,7 @@ PARAMETER_TYPES = {
 }
 
 
-def test_parameter_descriptions(seen: tuple[Run, Drive], machine: Machine):
+def test_parameter_descriptions(seen: tuple[Run, AxesClient], machine: Machine):
     """Text, unit, type, range, choices, and whether the parameter is read-only."""
     for descriptor in seen[1].describe(list(machine.rows)):
         row = machine.rows[descriptor.name]
@@ -267,7 +268,7 @@ def test_parameter_descriptions(seen: tuple[Run, Drive], machine: Machine):
         assert descriptor.type == PARAMETER_TYPES[row.type], descriptor.name
 
 
-def test_parameter_values(seen: tuple[Run, Drive], machine: Machine):
+def test_parameter_values(seen: tuple[Run, AxesClient], machine: Machine):
     """Values of the machine file, and documented defaults of all other parameters."""
     values = seen[1].get_parameters(list(machine.rows))
     for name, value in values.items():

@@ -12,8 +12,8 @@ import pytest
 from trajectory_msgs.msg import JointTrajectory
 from virtual_axes.msg import TrajectoryResult as R
 
-from drive import NANOSECONDS, TSP_NS, Drive, joint_trajectory, to_ns
 from motion import assert_psec, go_home, swing
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, to_ns
 
 ANY = object()
 
@@ -23,7 +23,7 @@ class Case:
     """A trajectory and the expected result; `ANY` is not compared."""
 
     code: int
-    make: Callable[[Drive], JointTrajectory]
+    make: Callable[[AxesClient], JointTrajectory]
     joint: Any = ""
     index: Any = -1
     value: Any = ANY
@@ -160,13 +160,13 @@ CASES = {
 class Motion:
     """A long active swing of x."""
 
-    drive: Drive
+    drive: AxesClient
     start: int
     plan: dict[str, np.ndarray]
 
 
 @pytest.fixture(scope="module")
-def motion(real: Drive) -> Iterator[Motion]:
+def motion(real: AxesClient) -> Iterator[Motion]:
     """Yields a swing of x of a minute; asserts at its end that no rejection has changed psec."""
     go_home(real)
     time, position = swing(60.0)
@@ -207,7 +207,7 @@ def test_rejected_with_its_reason(motion: Motion, case: Case):
     assert assert_psec(drive, motion.start, plan, max(before, motion.start), after) >= 3
 
 
-def test_axes_at_rest_do_not_move_on_a_rejection(start: Callable[..., Drive]):
+def test_axes_at_rest_do_not_move_on_a_rejection(start: Callable[..., AxesClient]):
     """A rejection without an active motion moves no axis."""
     drive = start()
     before = drive.latest("position")
@@ -217,11 +217,11 @@ def test_axes_at_rest_do_not_move_on_a_rejection(start: Callable[..., Drive]):
     assert drive.latest("position") == before
 
 
-def test_results_reach_a_late_subscriber(start: Callable[..., Drive]):
+def test_results_reach_a_late_subscriber(start: Callable[..., AxesClient]):
     """~/trajectory_result is transient local: a late subscriber receives the results."""
     drive = start()
     result = drive.decision(drive.send(line("q", (1, 0.1))))
-    with Drive(node=drive.target, domain_id=drive.process.domain_id) as late:
+    with AxesClient(node=drive.target, domain_id=drive.process.domain_id) as late:
         seen = late.wait_for(late.results, 5, "old results")
         assert bytes(seen[0].publisher_gid) == bytes(result.publisher_gid) == drive.gid
         assert seen[0].sequence_number == result.sequence_number == 1

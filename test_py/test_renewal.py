@@ -20,10 +20,10 @@ from sensor_msgs.msg import JointState
 from virtual_axes.msg import TrajectoryResult
 
 from action import Follow, goal, line
-from drive import NANOSECONDS, TSP_NS, Drive, joint_trajectory
 from participant import Participant
 from sim_clock import SimClock
 from test_record import read, stamps
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory
 
 DEPARTED = 60
 """Number of departed endpoints of a renewal."""
@@ -40,7 +40,7 @@ MOVED = 0.02
 """Position of X before the renewal, m."""
 
 
-def leave(drive: Drive, meanwhile: Callable[[], None] = lambda: None) -> None:
+def leave(drive: AxesClient, meanwhile: Callable[[], None] = lambda: None) -> None:
     """Creates subscriptions in another participant, which leaves when the node has discovered them."""
     assert drive.process is not None
 
@@ -49,19 +49,19 @@ def leave(drive: Drive, meanwhile: Callable[[], None] = lambda: None) -> None:
         return int(drive.next_status()["endpoints_discovered"])
 
     before = count()
-    with Drive(process=drive.process, listen=False) as other:
+    with AxesClient(process=drive.process, keep_samples=False) as other:
         for number in range(DEPARTED):
             create = other.node.create_subscription
             other.in_executor(lambda: create(JointState, f"/departing_{number}", lambda _: None, 1))
         drive.wait_for(lambda: count() >= before + DEPARTED, 30, "the endpoints that will depart")
 
 
-def writers(drive: Drive, topic: str = "/joint_states") -> set[bytes]:
+def writers(drive: AxesClient, topic: str = "/joint_states") -> set[bytes]:
     """Returns the GIDs of a topic's publishers."""
     return {bytes(info.endpoint_gid) for info in drive.node.get_publishers_info_by_topic(topic)}
 
 
-def endpoints(drive: Drive) -> Counter:
+def endpoints(drive: AxesClient) -> Counter:
     """Returns the endpoints of the node with their types and QoS."""
     name, namespace = drive.target.lstrip("/"), "/"
     found: Counter = Counter()
@@ -81,7 +81,7 @@ def endpoints(drive: Drive) -> Counter:
     return found
 
 
-def renew(drive: Drive, meanwhile: Callable[[], None]) -> None:
+def renew(drive: AxesClient, meanwhile: Callable[[], None]) -> None:
     """Waits for the next renewal to end and calls `meanwhile` until then."""
     first = writers(drive)
     deadline = time.monotonic() + RENEWAL_S
@@ -93,7 +93,7 @@ def renew(drive: Drive, meanwhile: Callable[[], None]) -> None:
     drive.wait_for(lambda: "participant is renewed" in drive.process.output(), 20, "log message")
 
 
-def test_a_renewal_loses_nothing(start: Callable[..., Drive], tmp_path: Path):
+def test_a_renewal_loses_nothing(start: Callable[..., AxesClient], tmp_path: Path):
     path = tmp_path / "renewed.mcap"
     drive = start("-p", f"renewal_endpoints:={DEPARTED}", "-p", f"record:={path}")
     with Follow(drive) as follow:
@@ -123,7 +123,7 @@ def test_a_renewal_loses_nothing(start: Callable[..., Drive], tmp_path: Path):
             """A rejected trajectory, a parameter request, and the node in the graph."""
             sent.append(drive.send(invalid))
             assert drive.get_parameters([GAIN])[GAIN] == pytest.approx(0.9 * gain)
-            assert drive.sees()
+            assert drive.is_in_graph()
             time.sleep(0.02)
 
         renew(drive, load_inputs)
@@ -177,7 +177,7 @@ def test_a_renewal_loses_nothing(start: Callable[..., Drive], tmp_path: Path):
     assert rejected == sent
 
 
-def test_with_a_simulated_clock_every_sample_arrives_once(start: Callable[..., Drive]):
+def test_with_a_simulated_clock_every_sample_arrives_once(start: Callable[..., AxesClient]):
     drive = start("-p", f"renewal_endpoints:={DEPARTED}", "-p", "use_sim_time:=true", connect=False)
     clock = SimClock(drive, now=100 * NANOSECONDS)
     clock.connect()
@@ -197,7 +197,7 @@ def test_with_a_simulated_clock_every_sample_arrives_once(start: Callable[..., D
 
 
 @pytest.mark.parametrize("setting", ["renewal_endpoints:=0", "time:=fast"])
-def test_there_is_no_renewal_if_disabled_or_in_fast(start: Callable[..., Drive], setting: str):
+def test_there_is_no_renewal_if_disabled_or_in_fast(start: Callable[..., AxesClient], setting: str):
     drive = start("-p", f"renewal_endpoints:={DEPARTED}", "-p", setting)
     first = writers(drive)
     leave(drive)
@@ -207,7 +207,7 @@ def test_there_is_no_renewal_if_disabled_or_in_fast(start: Callable[..., Drive],
         time.sleep(0.05)
 
 
-def test_a_shutdown_during_a_renewal_removes_both_participants(start: Callable[..., Drive]):
+def test_a_shutdown_during_a_renewal_removes_both_participants(start: Callable[..., AxesClient]):
     drive = start("-p", f"renewal_endpoints:={DEPARTED}")
     process = drive.process
     leave(drive)
@@ -215,12 +215,12 @@ def test_a_shutdown_during_a_renewal_removes_both_participants(start: Callable[.
     assert process.stop(signal.SIGTERM) == 0
     # The process has ended; wait_for() would report that.
     until = time.monotonic() + GONE_S
-    while drive.sees() or writers(drive):
+    while drive.is_in_graph() or writers(drive):
         assert time.monotonic() < until
         time.sleep(0.02)
 
 
-def test_a_peer_that_is_not_discovered_again_is_not_lost(start: Callable[..., Drive], tmp_path: Path):
+def test_a_peer_that_is_not_discovered_again_is_not_lost(start: Callable[..., AxesClient], tmp_path: Path):
     """A stopped process is not discovered by the new participant; the present one is kept, with its samples."""
     drive = start("-p", f"renewal_endpoints:={DEPARTED}")
     first = writers(drive)

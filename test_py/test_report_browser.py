@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from browser import Browser, find_browser
-from drive import node_binary
+from node_process import node_binary
 
 LIGHT, DARK = "light", "dark"
 WIDE, NARROW = 1280, 360

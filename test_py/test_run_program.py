@@ -15,10 +15,10 @@ from virtual_axes.action import RunProgram
 from virtual_axes.msg import TrajectoryResult as R
 
 from action import Follow, ending, goal, line, results_of
-from drive import NANOSECONDS, TSP_NS, Drive, Node, joint_trajectory, to_ns
-from drive.process import resident_mb
 from motion import TSP, go_home
+from node_process import Node, resident_mb
 from test_feed_override import Feed
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, to_ns
 
 ROOT = Path(__file__).parents[1]
 Goal, Result = RunProgram.Goal, RunProgram.Result
@@ -41,7 +41,7 @@ LONG = "G21 G90 G64 P0.05\n" + "O1 repeat [100000]\nG1 X20 F1500\nY20\nX0\nY0\nO
 @pytest.fixture(scope="module")
 def programs() -> Iterator[Follow]:
     args = ["-p", "time:=fast", "-p", "action_monitor_rate:=50.0"]
-    with Node(args) as process, Drive(process=process) as drive:
+    with Node(args) as process, AxesClient(process=process) as drive:
         with Follow(drive, f"{drive.target}/run_program", kind=RunProgram) as follow:
             yield follow
 
@@ -245,7 +245,7 @@ def test_the_stop_service_and_a_newer_program_end_a_program(programs: Follow) ->
 def test_a_long_program_needs_constant_memory() -> None:
     """Memory after minutes of a program is that after its first seconds."""
     # Without subscriptions at the rate of the position cycles, for which the middleware needs memory in waves.
-    with Node(["-p", "time:=fast"]) as process, Drive(process=process, listen=False) as drive:
+    with Node(["-p", "time:=fast"]) as process, AxesClient(process=process, keep_samples=False) as drive:
         with Follow(drive, f"{drive.target}/run_program", kind=RunProgram) as programs:
             sent = programs.send(Goal(program=LONG))
             begin = to_ns(sent.wait_for_feedback().header.stamp)
@@ -263,7 +263,7 @@ def test_a_long_program_needs_constant_memory() -> None:
             assert sent.status(30) == GoalStatus.STATUS_CANCELED
 
 
-def test_a_program_runs_in_real_time(start: Callable[..., Drive]) -> None:
+def test_a_program_runs_in_real_time(start: Callable[..., AxesClient]) -> None:
     """A chunk that is late stops the axes on the path, so that the setpoints keep their limits in any case."""
     drive = start("-p", "time:=real")
     with Follow(drive, f"{drive.target}/run_program", kind=RunProgram) as programs:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from drive import DomainId, Node
+from node_process import DomainId, Node
 
 KEYSTORE = Path(__file__).resolve().parent.parent / "tools" / "keystore.py"
 SECURE = os.environ.get("VIRTUAL_AXES_SECURE_NODE")

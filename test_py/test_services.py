@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from virtual_axes.msg import TrajectoryResult as R
 
-from drive import TSP_NS, Drive, joint_trajectory
 from motion import go_home, start_swing
+from virtual_axes_py.ros import TSP_NS, AxesClient, joint_trajectory
 
 
-def test_reset_puts_the_axes_back_to_rest_at_the_start(real: Drive):
+def test_reset_puts_the_axes_back_to_rest_at_the_start(real: AxesClient):
     """The active motion gets a result; positions and currents equal those of the start exactly."""
     go_home(real)
     home_position, home_current = real.latest("position"), real.latest("voltage")
@@ -24,7 +24,7 @@ def test_reset_puts_the_axes_back_to_rest_at_the_start(real: Drive):
     assert not any(real.latest("velocity").values())
 
 
-def test_stop_is_controlled(real: Drive):
+def test_stop_is_controlled(real: AxesClient):
     """The stop is within the limits of the axis, and the motion gets a result."""
     go_home(real)
     accepted, start, _ = start_swing(real, duration=3.0, amplitude=0.2)
@@ -38,7 +38,7 @@ def test_stop_is_controlled(real: Drive):
     assert np.ptp(psec[-50:]) == 0 and 0.01 < psec[-1] < 0.2
 
 
-def test_services_at_rest_change_nothing(real: Drive):
+def test_services_at_rest_change_nothing(real: AxesClient):
     """Both succeed, and the axes stay where they are."""
     go_home(real)
     before = real.latest("position")
@@ -48,7 +48,7 @@ def test_services_at_rest_change_nothing(real: Drive):
     assert real.latest("position") == before
 
 
-def test_after_a_stop_a_new_motion_starts_from_there(real: Drive):
+def test_after_a_stop_a_new_motion_starts_from_there(real: AxesClient):
     """The stop leaves no residual state."""
     go_home(real)
     _, start, _ = start_swing(real, duration=3.0)

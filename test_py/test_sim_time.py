@@ -12,9 +12,10 @@ from rclpy.qos import ReliabilityPolicy
 from virtual_axes.msg import TrajectoryResult
 
 from action import Follow, goal, line
-from drive import NANOSECONDS, TSP_NS, Drive, Node, joint_trajectory, stamp_of, status_values, to_ns
 from motion import assert_psec, swing
+from node_process import Node
 from sim_clock import SimClock
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, stamp_of, status_values, to_ns
 
 BEGIN = 1_000 * NANOSECONDS + 1_234_567
 """Position cycle, ns."""
@@ -25,14 +26,14 @@ def clock() -> Iterator[SimClock]:
     """Yields axes that follow a clock under test control, shared by the module."""
     with (
         Node(["-p", "use_sim_time:=true"]) as process,
-        Drive(process=process, connect=False) as drive,
+        AxesClient(process=process, connect=False) as drive,
     ):
         clock = SimClock(drive, BEGIN)
         clock.connect()
         yield clock
 
 
-def state_of(drive: Drive, wanted: str, timeout: float = 8.0) -> dict[str, str]:
+def state_of(drive: AxesClient, wanted: str, timeout: float = 8.0) -> dict[str, str]:
     """Returns the values of the node's diagnostics once its state is the expected one."""
     seen = len(drive.diagnostics())
 
@@ -51,15 +52,15 @@ def begin_anew(clock: SimClock, first: int) -> None:
     clock.set(first)
     samples = clock.drive._samples.values()
     clock.drive.wait_for(lambda: all(stamp_of(s[-1]) == first for s in samples), 5, f"samples of {first}")
-    clock.drive.forget()
+    clock.drive.drop_samples()
 
 
-def stamps_since(drive: Drive, begin: int, end: int) -> np.ndarray:
+def stamps_since(drive: AxesClient, begin: int, end: int) -> np.ndarray:
     """Returns the stamps of all joint states between two times, ns."""
     return drive.record(begin, end).joints.stamp
 
 
-def test_before_the_first_message_the_axes_wait(start: Callable[..., Drive]):
+def test_before_the_first_message_the_axes_wait(start: Callable[..., AxesClient]):
     """The node publishes nothing, services respond, and a trajectory waits for the clock."""
     drive = start("-p", "use_sim_time:=true", connect=False)
     drive.wait_for(lambda: drive._psec.get_subscription_count() > 0, 10, "subscription of psec")
@@ -93,7 +94,7 @@ def test_before_the_first_message_the_axes_wait(start: Callable[..., Drive]):
     assert drive.end(soon, 5).status == TrajectoryResult.STOPPED
 
 
-def test_canceling_a_goal_before_the_first_message_keeps_other_goals(start: Callable[..., Drive]):
+def test_canceling_a_goal_before_the_first_message_keeps_other_goals(start: Callable[..., AxesClient]):
     """The goal ends at once; the other goal begins with the first clock message."""
     drive = start("-p", "use_sim_time:=true", connect=False)
     with Follow(drive) as follow:
@@ -116,7 +117,7 @@ def test_the_grid_is_unbroken_at_any_clock_step(clock: SimClock, step: float):
     assert np.array_equal(stamps, np.arange(-(-begin // TSP_NS) * TSP_NS, clock.now + 1, TSP_NS))
 
 
-def test_a_motion_has_the_same_bits_at_any_speed(clock: SimClock, fast: Drive):
+def test_a_motion_has_the_same_bits_at_any_speed(clock: SimClock, fast: AxesClient):
     """Slow, ten times faster, in leaps and with a pause, compared with another node in `fast`."""
     drive = clock.drive
     drive.set_parameters({"x.velocity_loop.gain": 5.0})

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
-from drive import DomainId, Drive, Node, joint_trajectory, node_binary
+from node_process import DomainId, Node, node_binary
+from virtual_axes_py.ros import AxesClient, joint_trajectory
 
 CONFIG = Path(__file__).resolve().parent.parent / "config"
 
@@ -26,7 +27,7 @@ def rejection(*ros_args: str, **env: str) -> str:
         domain.release()
 
 
-def test_names_prefix_and_remapping(start: Callable[..., Drive]):
+def test_names_prefix_and_remapping(start: Callable[..., AxesClient]):
     """Namespace, node name, joint prefix and a remapped topic, all at once."""
     drive = start("-r", "__ns:=/cell", "-r", "__node:=mill", "-p", "joint_prefix:=mill_", name="/cell/mill")
     assert list(drive.latest("position")) == ["mill_x", "mill_y", "mill_z", "mill_a", "mill_c"]
@@ -35,20 +36,20 @@ def test_names_prefix_and_remapping(start: Callable[..., Drive]):
     assert "/cell/mill/motor_currents" in topics and "/cell/joint_states" in topics
 
 
-def test_a_topic_under_another_name(start: Callable[..., Drive]):
+def test_a_topic_under_another_name(start: Callable[..., AxesClient]):
     """The first matching rule applies, and the old name does not exist."""
     drive = start("-r", "joint_states:=/axes", "-r", "/axes:=/nothing", connect=False)
     drive.wait_for(lambda: drive.node.count_publishers("/axes") > 0, 10, "publisher of /axes")
     assert drive.node.count_publishers("/joint_states") == 0
 
 
-def test_an_integer_is_accepted_for_a_double(start: Callable[..., Drive]):
+def test_an_integer_is_accepted_for_a_double(start: Callable[..., AxesClient]):
     """The later of two values applies."""
     drive = start("-p", "x.velocity_loop.gain:=3.5", "-p", "x.velocity_loop.gain:=4")
     assert drive.get_parameters(["x.velocity_loop.gain"]) == {"x.velocity_loop.gain": 4.0}
 
 
-def test_the_linear_motor_machine_moves(start: Callable[..., Drive]):
+def test_the_linear_motor_machine_moves(start: Callable[..., AxesClient]):
     """Another machine file: other drives, another position cycle."""
     file = next(path for path in CONFIG.glob("*.yaml") if "mikron" not in path.name)
     drive = start("--params-file", str(file), "-p", "time:=fast")
@@ -58,7 +59,7 @@ def test_the_linear_motor_machine_moves(start: Callable[..., Drive]):
     assert position["y"] == pytest.approx(-0.05, abs=2e-6)
 
 
-def test_quality_of_service_by_parameter(start: Callable[..., Drive]):
+def test_quality_of_service_by_parameter(start: Callable[..., AxesClient]):
     """The graph shows the set values; others stay as documented."""
     drive = start("-p", "qos.drive_states.reliability:=best_effort", "-p", "qos.psec.depth:=5", connect=False)
 
@@ -75,7 +76,7 @@ def test_quality_of_service_by_parameter(start: Callable[..., Drive]):
         assert drive.wait_for(lambda: offered(topic), 10, f"publisher of {topic}") == wanted
 
 
-def test_publish_rate_decimates_the_grid(start: Callable[..., Drive]):
+def test_publish_rate_decimates_the_grid(start: Callable[..., AxesClient]):
     """At 1/12 ms every second instant is published."""
     drive = start("-p", f"publish_rate:={1 / 0.012}", "-p", "time:=fast")
     recording = drive.run(joint_trajectory(["x"], [0.0, 0.6], [[0.0], [0.01]]))

@@ -14,15 +14,15 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from virtual_axes.msg import TrajectoryResult as R
 
-from drive import TSP_NS, Drive, joint_trajectory, status_values, to_ns
 from motion import TSP, assert_psec, go_home, start_swing
+from virtual_axes_py.ros import TSP_NS, AxesClient, joint_trajectory, status_values, to_ns
 
 ATTEMPTS = 4
 REACH = 0.5 * TSP
 """Step of x per position cycle, m."""
 
 
-def follow(drive: Drive, joints: Sequence[str], rows: np.ndarray) -> None:
+def follow(drive: AxesClient, joints: Sequence[str], rows: np.ndarray) -> None:
     """Streams rows of positions, each after the previous one is commanded."""
     for row in rows:
         drive.stream(joints, row)
@@ -30,7 +30,7 @@ def follow(drive: Drive, joints: Sequence[str], rows: np.ndarray) -> None:
         drive.wait_for(lambda: wanted.items() <= drive.latest("psec").items(), 5, f"setpoint {wanted}")
 
 
-def commanded(drive: Drive, joint: str, begin: int) -> np.ndarray:
+def commanded(drive: AxesClient, joint: str, begin: int) -> np.ndarray:
     """Returns the commands of `joint` since `begin`, in order, without repetitions; asserts an unbroken grid."""
     states = drive.record(begin, drive.now()).states
     assert set(np.diff(states.stamp)) <= {TSP_NS}
@@ -38,7 +38,7 @@ def commanded(drive: Drive, joint: str, begin: int) -> np.ndarray:
     return psec[np.concatenate([[True], psec[1:] != psec[:-1]])]
 
 
-def node_status(drive: Drive, condition: Callable[[dict[str, str]], bool]) -> DiagnosticStatus:
+def node_status(drive: AxesClient, condition: Callable[[dict[str, str]], bool]) -> DiagnosticStatus:
     """Returns the node's status of the first new diagnostics whose values satisfy `condition`."""
     seen = len(drive.diagnostics())
 
@@ -48,25 +48,25 @@ def node_status(drive: Drive, condition: Callable[[dict[str, str]], bool]) -> Di
     return drive.wait_for(found, 5, "diagnostics of the stream")[0]
 
 
-def numbers(drive: Drive, *keys: str) -> tuple[int, ...]:
+def numbers(drive: AxesClient, *keys: str) -> tuple[int, ...]:
     """Returns counters of the node, from the next diagnostics."""
     reported = drive.next_status()
     return tuple(int(reported[key]) for key in keys)
 
 
-def counts(drive: Drive) -> tuple[int, int]:
+def counts(drive: AxesClient) -> tuple[int, int]:
     """Returns the numbers of rejected and ignored setpoints."""
     rejected, ignored = numbers(drive, "stream_setpoints_rejected", "stream_setpoints_ignored")
     return rejected, ignored
 
 
-def stream_results(drive: Drive, begin: int) -> list[R]:
+def stream_results(drive: AxesClient, begin: int) -> list[R]:
     """Returns the results of the stream since `begin`, ns."""
     found = [result for result in drive.results() if result.source == R.SOURCE_STREAM]
     return [result for result in found if to_ns(result.header.stamp) >= begin]
 
 
-def results_of_preemption(drive: Drive, take: Callable[[], object]) -> list[R]:
+def results_of_preemption(drive: AxesClient, take: Callable[[], object]) -> list[R]:
     """Returns the results when `take` preempts joints of a stream at rest at x = 0.001, y = 0; a few attempts."""
     for _ in range(ATTEMPTS):
         go_home(drive)
@@ -101,7 +101,7 @@ def wave(amplitude: float, count: int = 100) -> np.ndarray:
 @pytest.mark.parametrize("mode", ["real", "fast"])
 def test_streamed_setpoints_are_executed_sample_by_sample(mode: str, request: pytest.FixtureRequest):
     """Two axes on their own paths: each setpoint bit for bit, none duplicated, none missing."""
-    drive: Drive = request.getfixturevalue(mode)
+    drive: AxesClient = request.getfixturevalue(mode)
     go_home(drive)
     begin = drive.now()
     rows = np.column_stack([wave(0.04), -wave(0.02)])[:80]
@@ -114,7 +114,7 @@ def test_streamed_setpoints_are_executed_sample_by_sample(mode: str, request: py
     assert drive.latest("psec")["x"] == rows[-1, 0]
 
 
-def test_a_sender_with_its_own_clock_is_followed_in_order(real: Drive):
+def test_a_sender_with_its_own_clock_is_followed_in_order(real: AxesClient):
     """At the position cycle of another clock: setpoints may repeat or be skipped, but never go back."""
     go_home(real)
     begin, rejected = real.now(), counts(real)[0]
@@ -132,7 +132,7 @@ def test_a_sender_with_its_own_clock_is_followed_in_order(real: Drive):
     assert counts(real)[0] == rejected
 
 
-def test_nan_and_short_arrays_do_not_command_joints(real: Drive):
+def test_nan_and_short_arrays_do_not_command_joints(real: AxesClient):
     """NaN and a missing position mean that the message does not command the joint."""
     go_home(real)
     begin = real.now()
@@ -148,7 +148,7 @@ def test_nan_and_short_arrays_do_not_command_joints(real: Drive):
     assert not commanded(real, "z", begin).any()
 
 
-def test_a_trajectory_preempts_a_stream(real: Drive):
+def test_a_trajectory_preempts_a_stream(real: AxesClient):
     """The trajectory starts at the streamed setpoint; other joints continue with the stream."""
     go_home(real)
     follow(real, ["x", "y"], np.array([[0.001, 0.001], [0.002, 0.002]]))
@@ -168,7 +168,7 @@ def test_a_trajectory_preempts_a_stream(real: Drive):
     assert real.latest("psec")["y"] == 0.012
 
 
-def test_invalid_streamed_setpoints_are_rejected_counted_and_logged_once_a_second(start: Callable[..., Drive]):
+def test_invalid_streamed_setpoints_are_rejected_counted_and_logged_once_a_second(start: Callable[..., AxesClient]):
     """Beyond the travel limits, out of reach, unknown joint; the axis does not move, and the log is limited."""
     drive = start()
     begin = drive.now()
@@ -192,7 +192,7 @@ def test_invalid_streamed_setpoints_are_rejected_counted_and_logged_once_a_secon
         assert 1 <= len(lines) <= 1 + lasted, reported
 
 
-def test_a_reset_ends_the_stream(real: Drive):
+def test_a_reset_ends_the_stream(real: AxesClient):
     """After the reset the old stream is out of reach; a stream that begins at home is accepted."""
     go_home(real)
     follow(real, ["x"], REACH * np.arange(1, 11).reshape(-1, 1) * 0.9)
@@ -205,7 +205,7 @@ def test_a_reset_ends_the_stream(real: Drive):
     np.testing.assert_array_equal(commanded(real, "x", begin), [0.0, REACH / 2])
 
 
-def test_a_stream_that_is_preempted_gets_a_result(real: Drive):
+def test_a_stream_that_is_preempted_gets_a_result(real: AxesClient):
     """One result, with the joints that the trajectory preempts."""
     hold = joint_trajectory(["x", "z"], [0.0, 0.1], [[0.001, 0.0], [0.002, 0.0]])
     reported = results_of_preemption(real, lambda: real.run(hold))
@@ -213,7 +213,7 @@ def test_a_stream_that_is_preempted_gets_a_result(real: Drive):
     assert re.fullmatch(r"preempted by trajectory \d+ of psec", reported[0].text)
 
 
-def test_after_a_stop_a_stream_is_ignored_until_it_pauses(real: Drive):
+def test_after_a_stop_a_stream_is_ignored_until_it_pauses(real: AxesClient):
     """The stream continues within reach of the axis; it gets a result, and is accepted after a pause."""
     go_home(real)
     reported = results_of_preemption(real, lambda: real.stop())
@@ -233,7 +233,7 @@ def test_after_a_stop_a_stream_is_ignored_until_it_pauses(real: Drive):
     node_status(real, lambda v: v["stream_held_off"] == "false")
 
 
-def test_duplicate_and_reordered_setpoints_are_ignored(real: Drive):
+def test_duplicate_and_reordered_setpoints_are_ignored(real: AxesClient):
     """Order by stamps, which are optional."""
     go_home(real)
     begin, before = real.now(), numbers(real, "stream_messages_out_of_order", "stream_setpoints_rejected")
@@ -247,7 +247,7 @@ def test_duplicate_and_reordered_setpoints_are_ignored(real: Drive):
     np.testing.assert_array_equal(commanded(real, "x", begin), [0.0, 0.001, 0.003, 0.0031, 0.004])
 
 
-def test_a_gap_in_the_stream_during_motion_holds_the_axes_and_is_logged(start: Callable[..., Drive]):
+def test_a_gap_in_the_stream_during_motion_holds_the_axes_and_is_logged(start: Callable[..., AxesClient]):
     """One log line and a counter in the diagnostics; a stream that ends at rest is not reported."""
     drive = start()
     follow(drive, ["x"], REACH * np.arange(1, 6).reshape(-1, 1) * 0.9)
@@ -264,7 +264,7 @@ def test_a_gap_in_the_stream_during_motion_holds_the_axes_and_is_logged(start: C
     assert 1 <= len(lines) <= gaps, lines
 
 
-def test_diagnostics_contain_stream_state_and_delay(real: Drive):
+def test_diagnostics_contain_stream_state_and_delay(real: AxesClient):
     """Without a controller with preview there is no delay."""
     go_home(real)
     status = node_status(real, lambda v: v["stream_drives"] == "false" and v["state"] == "holding")
@@ -289,7 +289,7 @@ def test_diagnostics_contain_stream_state_and_delay(real: Drive):
     real.stop()
 
 
-def test_a_controller_with_preview_delays_the_stream(start: Callable[..., Drive]):
+def test_a_controller_with_preview_delays_the_stream(start: Callable[..., AxesClient]):
     """The delay is the preview beyond the part that alpha covers, and equal for all joints."""
     drive = start("-p", "x.position_loop.controller:=gpc")
     found = drive.get_parameters(["x.position_loop.gpc.n2", "x.delays.alpha_ms"])
@@ -314,7 +314,7 @@ def test_a_controller_with_preview_delays_the_stream(start: Callable[..., Drive]
     node_status(drive, lambda v: v["stream_delay_ms"] == "0")
 
 
-def test_in_fast_a_stream_runs_at_wall_clock_rate(fast: Drive):
+def test_in_fast_a_stream_runs_at_wall_clock_rate(fast: AxesClient):
     """Its sender runs in real time, too: the axes must not run ahead of it."""
     go_home(fast)
     before, began = fast.now(), time.monotonic()
@@ -326,7 +326,7 @@ def test_in_fast_a_stream_runs_at_wall_clock_rate(fast: Drive):
     assert 0 < shown < 1.5 * passed
 
 
-def test_the_topic_can_be_renamed_and_is_reliable(start: Callable[..., Drive]):
+def test_the_topic_can_be_renamed_and_is_reliable(start: Callable[..., AxesClient]):
     """Renamed to the topic on which ros2_control's topic-based hardware publishes."""
     drive = start("-r", "psec_stream:=/robot_joint_commands", connect=False)
     found = drive.wait_for(

@@ -11,8 +11,9 @@ import pytest
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 
-from drive import DEEP_QOS, TSP_NS, Drive, Node, ballbar, joint_trajectory, to_ns
+from node_process import Node
 from reference_kinematics import OFFSETS, tool_pose
+from virtual_axes_py.ros import DEEP_QOS, TSP_NS, AxesClient, ballbar, joint_trajectory, to_ns
 
 JOINTS = ["x", "y", "z", "a", "c"]
 LENGTH = 850
@@ -24,7 +25,7 @@ SPACING = 1e-4
 class Tool:
     """Messages of a node about its tool."""
 
-    def __init__(self, drive: Drive):
+    def __init__(self, drive: AxesClient):
         """Subscribes with the node of a drive, in its executor."""
         self.drive = drive
         self.poses: dict[int, PoseStamped] = {}
@@ -87,7 +88,7 @@ def tool() -> Iterator[Tool]:
     offsets = [text for key, value in OFFSETS.items() for text in ("-p", f"kinematics.{key}_mm:={value}")]
     arguments = ["-p", "time:=fast", "-p", "tool_path_rate:=10.0", "-p", "workpiece_frame:=left/workpiece"]
     arguments += ["-p", f"tool_path_length:={LENGTH}"]
-    with Node([*arguments, *offsets]) as process, Drive(process=process) as drive:
+    with Node([*arguments, *offsets]) as process, AxesClient(process=process) as drive:
         yield Tool(drive)
 
 
@@ -124,7 +125,7 @@ def test_a_reset_clears_the_paths(tool: Tool):
     assert stamps(actual)[0] > now - 100 * TSP_NS
 
 
-def test_the_paths_show_the_contour_error_of_the_ballbar(fast: Drive):
+def test_the_paths_show_the_contour_error_of_the_ballbar(fast: AxesClient):
     """Actual against setpoint: 49 um outside on average, 48 at least; setpoints on the circle itself."""
     tool = Tool(fast)
     path = ballbar(turns=1.0)
@@ -166,7 +167,7 @@ def test_a_long_path_keeps_its_newest_poses(tool: Tool):
     assert np.maximum(*steps).min() >= SPACING * (1 - 1e-9)
 
 
-def test_a_rate_of_zero_publishes_no_path(start: Callable[..., Drive]):
+def test_a_rate_of_zero_publishes_no_path(start: Callable[..., AxesClient]):
     """The pose is still published."""
     drive = start("-p", "time:=fast", "-p", "tool_path_rate:=0.0")
     seen: list[object] = []

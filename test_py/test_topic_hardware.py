@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from drive import TSP_NS, Drive, Node
 from motion import TSP, go_home
+from node_process import Node
 from topic_hardware import COMMANDS_TOPIC, STATES_TOPIC, Network, TopicHardware
+from virtual_axes_py.ros import TSP_NS, AxesClient
 
 REMAPS = (f"psec_stream:={COMMANDS_TOPIC}", f"joint_states:={STATES_TOPIC}")
 JOINTS = ["c", "a", "y", "x", "z"]
@@ -23,10 +24,10 @@ ATTEMPTS = 4
 
 
 @pytest.fixture(scope="module")
-def robot() -> Iterator[Drive]:
+def robot() -> Iterator[AxesClient]:
     """Yields axes with the default names of the hardware."""
     arguments = [word for remap in REMAPS for word in ("-r", remap)]
-    with Node(arguments) as process, Drive(process=process, remaps=REMAPS) as drive:
+    with Node(arguments) as process, AxesClient(process=process, remaps=REMAPS) as drive:
         yield drive
 
 
@@ -49,7 +50,7 @@ COUNTS = (
 )
 
 
-def counts(drive: Drive) -> dict[str, int]:
+def counts(drive: AxesClient) -> dict[str, int]:
     """Returns new values of the node's counters."""
     reported = drive.next_status()
     return {key: int(reported[key]) for key in COUNTS}
@@ -62,7 +63,7 @@ def rise(amplitude: float, duration: float, t: float) -> float:
 
 
 def drive_hardware(
-    drive: Drive, moves: Mapping[str, float], duration: float, rate: float, network: Network, threshold: float
+    drive: AxesClient, moves: Mapping[str, float], duration: float, rate: float, network: Network, threshold: float
 ) -> Run:
     """Moves joints through ros2_control and waits until they settle."""
     go_home(drive)
@@ -89,7 +90,7 @@ def drive_hardware(
     )
 
 
-def attempt(drive: Drive, *args: object) -> Run:
+def attempt(drive: AxesClient, *args: object) -> Run:
     """Returns a run that was not interrupted by a stall of the test machine."""
     for _ in range(ATTEMPTS):
         run = drive_hardware(drive, *args)
@@ -101,7 +102,7 @@ def attempt(drive: Drive, *args: object) -> Run:
 
 
 @pytest.mark.parametrize(("rate", "threshold"), [(100.0, -1.0), (250.0, 1e-5)])
-def test_commands_reach_the_axes(robot: Drive, rate: float, threshold: float):
+def test_commands_reach_the_axes(robot: AxesClient, rate: float, threshold: float):
     """Only commanded setpoints, in order; other joints do not move."""
     moves = {"x": 0.06, "y": -0.04, "c": 0.1}
     run = attempt(robot, moves, 0.8, rate, Network(), threshold)
@@ -116,7 +117,7 @@ def test_commands_reach_the_axes(robot: Drive, rate: float, threshold: float):
     assert not run.psec["a"].any() and not run.psec["z"].any()
 
 
-def test_network_disturbances_do_not_change_the_final_position(robot: Drive):
+def test_network_disturbances_do_not_change_the_final_position(robot: AxesClient):
     """At nine tenths of the maximum speed: nothing rejected, no lockout, no step beyond Vmax·Tsp."""
     network = Network(seed=5, jitter=0.012, duplicates=0.2, gaps=0.02, gap=0.03)
     # The maximum speed of `rise` is twice the mean.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from drive import TSP_NS, Drive
 from motion import assert_psec, start_swing
+from virtual_axes_py.ros import TSP_NS, AxesClient
 
 
-def test_domains_are_separate(start: Callable[..., Drive]):
+def test_domains_are_separate(start: Callable[..., AxesClient]):
     """A motion in one domain leaves the other at rest, without a result."""
     moved, still = start(), start()
     assert moved.process.domain_id != still.process.domain_id
@@ -21,7 +21,7 @@ def test_domains_are_separate(start: Callable[..., Drive]):
     assert len(moved.results()) >= 1
 
 
-def test_two_namespaces_share_a_domain(start: Callable[..., Drive]):
+def test_two_namespaces_share_a_domain(start: Callable[..., AxesClient]):
     """In one domain the namespaces separate the machines."""
     left = start("-r", "__ns:=/left", name="/left/virtual_axes")
     right = start("-r", "__ns:=/right", name="/right/virtual_axes", domain_id=left.process.domain_id)

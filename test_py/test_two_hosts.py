@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from drive import DomainId, Node
+from node_process import DomainId, Node
 from two_hosts import CLIENT_ADDRESS, NODE_ADDRESS, Link, reason_to_skip
 
 SKIP = reason_to_skip()

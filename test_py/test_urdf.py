@@ -15,7 +15,7 @@ import pytest
 import yaml
 from urdf_parser_py.urdf import URDF, Joint
 
-from drive import node_binary
+from node_process import node_binary
 from reference_kinematics import OFFSETS, tool_pose
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -17,7 +17,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import virtual_axes_py as va
-from drive import node_binary
+from node_process import node_binary
 
 ROOT = Path(__file__).resolve().parent.parent
 COMMAND = str(Path(node_binary()).with_name("virtual_axes"))

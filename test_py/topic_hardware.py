@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 
-from drive import Drive
+from virtual_axes_py.ros import AxesClient
 
 COMMANDS_TOPIC = "/robot_joint_commands"
 STATES_TOPIC = "/robot_joint_states"
@@ -64,7 +64,7 @@ class TopicHardware:
 
     def __init__(
         self,
-        drive: Drive,
+        drive: AxesClient,
         joints: Sequence[str],
         position_interfaces: Sequence[str],
         threshold: float = THRESHOLD,

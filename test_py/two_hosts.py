@@ -26,7 +26,8 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from drive import NANOSECONDS, TSP_NS, Drive, die_with_parent, joint_trajectory  # noqa: E402
+from node_process import die_with_parent  # noqa: E402
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory  # noqa: E402
 
 NODE_ADDRESS, CLIENT_ADDRESS = "10.79.0.1", "10.79.0.2"
 PATIENCE_S = 150.0
@@ -161,7 +162,7 @@ def write(**result: object) -> None:
     print(json.dumps(result), flush=True)
 
 
-def watch(drive: Drive, seconds: float) -> dict[str, int]:
+def watch(drive: AxesClient, seconds: float) -> dict[str, int]:
     """Receives samples for `seconds`; returns their number and that of the missing ones."""
     start = drive.now()
     end = start + round(seconds * NANOSECONDS)
@@ -170,7 +171,7 @@ def watch(drive: Drive, seconds: float) -> dict[str, int]:
     return {"received": len(stamps), "missing": round((stamps[-1] - stamps[0]) / TSP_NS) + 1 - len(stamps)}
 
 
-def move(drive: Drive, points: int) -> None:
+def move(drive: AxesClient, points: int) -> None:
     """Executes a short trajectory; then submits one of `points` points, at 0.5 s each, and stops it."""
     recording = drive.run(joint_trajectory(["x"], [0.0, 1.0], [[0.0], [0.01]]), settle=0.5)
     gaps = [gap for gap in recording.joints.stamp[1:] - recording.joints.stamp[:-1] if gap != TSP_NS]
@@ -187,7 +188,7 @@ def main() -> None:
     """Runs the command."""
     node, command, value = sys.argv[1:]
     began = time.monotonic()
-    with Drive(node, timeout=DISCOVERY_S) as drive:
+    with AxesClient(node, timeout=DISCOVERY_S) as drive:
         write(discovered_s=time.monotonic() - began)
         if command == "watch":
             write(**watch(drive, float(value)))

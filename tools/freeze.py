@@ -493,8 +493,8 @@ def record_commands(programs: Programs, say: Callable[[str], None]) -> dict[str,
 
 
 def process_module() -> ModuleType:
-    """Loads test_py/drive/process.py alone: the package needs this tree's messages, which another build may lack."""
-    spec = importlib.util.spec_from_file_location("drive_process", ROOT / "test_py" / "drive" / "process.py")
+    """Loads test_py/node_process.py of this tree, whatever the path of modules is."""
+    spec = importlib.util.spec_from_file_location("node_process", ROOT / "test_py" / "node_process.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -22,7 +22,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 
 from trajectory_msgs.msg import JointTrajectory
 
-from drive import PSEC_QOS, Drive, Node, resident_mb
+from node_process import Node, resident_mb
+from virtual_axes_py.ros import PSEC_QOS, AxesClient
 
 FRAGMENT = 1024
 """Octets of the only fragment that is sent."""
@@ -49,7 +50,7 @@ def main() -> None:
     length = round(parser.parse_args().megabytes * 1_000_000)
     if not FRAGMENT < length <= LONGEST:
         parser.error(f"a message of {length} octets: must be longer than a fragment, {FRAGMENT}, up to {LONGEST}")
-    with Node(["-p", "time:=real"]) as process, Drive(process=process) as drive:
+    with Node(["-p", "time:=real"]) as process, AxesClient(process=process) as drive:
         drive.node.create_publisher(JointTrajectory, "/psec", PSEC_QOS)
         time.sleep(1.0)
         own = [info for info in drive.node.get_publishers_info_by_topic("/psec")]

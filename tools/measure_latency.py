@@ -32,7 +32,8 @@ import options
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-from drive import DEEP_QOS, TSP_NS, Drive, Node  # noqa: E402
+from node_process import Node  # noqa: E402
+from virtual_axes_py.ros import DEEP_QOS, TSP_NS, AxesClient  # noqa: E402
 
 STEP = 2e-3
 """Step of the setpoint within reach of the axis in one cycle, m."""
@@ -42,7 +43,7 @@ REST = 0.4
 """Time until the axis is at rest again, s."""
 
 
-def measure(drive: Drive, messages: int, seed: int) -> dict[str, np.ndarray]:
+def measure(drive: AxesClient, messages: int, seed: int) -> dict[str, np.ndarray]:
     """Returns the latencies of both kinds, s."""
     rng = random.Random(seed)
     came: dict[str, list[tuple[int, float]]] = {"psec": [], "position": []}
@@ -83,7 +84,7 @@ def main() -> int:
     parser.add_argument("--messages", type=options.whole, default=300, help="setpoints (300)")
     parser.add_argument("--seed", type=int, default=1, help="random seed of the phases (1)")
     args = parser.parse_args()
-    with Node(["-p", "time:=real"]) as process, Drive(process=process) as drive:
+    with Node(["-p", "time:=real"]) as process, AxesClient(process=process) as drive:
         latencies = measure(drive, args.messages, args.seed)
     print(f"{args.messages} setpoints, position cycle {TSP_NS / 1e6:g} ms, {os.cpu_count()} cores; in cycles:")
     for key, name in (("psec", "commanded"), ("position", "axis has moved")):

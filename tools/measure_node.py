@@ -48,18 +48,16 @@ import options
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-from drive import (  # noqa: E402
+from node_process import Node, node_binary, status_of  # noqa: E402
+from virtual_axes_py.ros import (  # noqa: E402
     DEEP_QOS,
     PSEC_QOS,
     SETTLE_S,
     STREAM_QOS,
     TSP_NS,
-    Node,
     ballbar,
     joint_trajectory,
-    node_binary,
     stamp_of,
-    status_of,
 )
 
 JOINTS = {"/joint_states": JointState}

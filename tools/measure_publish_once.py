@@ -27,7 +27,8 @@ import options
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-from drive import DomainId, Drive, Node  # noqa: E402
+from node_process import DomainId, Node  # noqa: E402
+from virtual_axes_py.ros import AxesClient  # noqa: E402
 
 PUBLISHERS = """
 import sys, time
@@ -108,7 +109,7 @@ def publish_to_a_node_yet_to_start(args: argparse.Namespace, number: int) -> boo
             time.sleep(1.5)
             with Node(["-p", "time:=real"], domain_id=domain.value) as process:
                 sent.result()
-                with Drive(process=process) as drive:
+                with AxesClient(process=process) as drive:
                     # Results are transient local.
                     time.sleep(1.0)
                     return any(result.joint == f"once_{number}" for result in drive.results())
@@ -127,7 +128,7 @@ def main() -> int:
     sent: dict[int, float] = {}
     try:
         log_level = ["--log-level", args.log_level] if args.log_level else []
-        with Node(["-p", "time:=real", *log_level]) as process, Drive(process=process) as drive:
+        with Node(["-p", "time:=real", *log_level]) as process, AxesClient(process=process) as drive:
             print(f"domain {process.domain_id}", flush=True)
             while len(sent) < args.runs:
                 runs = min(args.per_process, args.runs - len(sent))

@@ -36,8 +36,9 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-from drive import PSEC_QOS, TSP_NS, Node, joint_trajectory, to_ns  # noqa: E402
 from measure_node import STARTED_S, cpu_seconds  # noqa: E402
+from node_process import Node  # noqa: E402
+from virtual_axes_py.ros import PSEC_QOS, TSP_NS, joint_trajectory, to_ns  # noqa: E402
 
 PERIODS_MS = (6, 3, 2, 1, 0.5, 0.25)
 """Position cycles, down to the velocity cycle."""

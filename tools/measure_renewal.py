@@ -31,7 +31,8 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 from sensor_msgs.msg import JointState  # noqa: E402
 
-from drive import DEEP_QOS, TSP_NS, Drive, Node, die_with_parent, own_mb, stamp_of  # noqa: E402
+from node_process import Node, die_with_parent, own_mb  # noqa: E402
+from virtual_axes_py.ros import DEEP_QOS, TSP_NS, AxesClient, stamp_of  # noqa: E402
 
 AT_A_TIME = 512
 """Number of publishers, and of subscriptions, of each participant."""
@@ -47,7 +48,7 @@ READ = "read"
 def read() -> None:
     """Reads joint_states until standard input ends, then writes stamps and arrivals, ns, as JSON."""
     stamps: list[tuple[int, int]] = []
-    with Drive(listen=False, connect=False) as drive:
+    with AxesClient(keep_samples=False, connect=False) as drive:
 
         def keep(sample: bytes) -> None:
             stamps.append((stamp_of(sample), time.monotonic_ns()))
@@ -62,7 +63,7 @@ def read() -> None:
 class Graph:
     """Polling of the graph in a thread: number of times the node was absent, and listed more than once."""
 
-    def __init__(self, drive: Drive):
+    def __init__(self, drive: AxesClient):
         """Starts the thread."""
         self.polls = self.absent = self.twice = 0
         self._drive = drive
@@ -84,7 +85,7 @@ class Graph:
         self._thread.join()
 
 
-def leave(drive: Drive, endpoints: int) -> None:
+def leave(drive: AxesClient, endpoints: int) -> None:
     """Lets participants join and leave until the node has discovered the given number of endpoints."""
     assert drive.process is not None
 
@@ -93,7 +94,7 @@ def leave(drive: Drive, endpoints: int) -> None:
 
     until = count() + endpoints
     while (before := count()) < until:
-        with Drive(process=drive.process, listen=False) as other:
+        with AxesClient(process=drive.process, keep_samples=False) as other:
 
             def join() -> None:
                 for number in range(AT_A_TIME):
@@ -142,7 +143,7 @@ def main() -> None:
     args = arguments()
     with (
         Node(["-p", f"renewal_endpoints:={args.endpoints}"]) as process,
-        Drive(process=process, listen=False) as drive,
+        AxesClient(process=process, keep_samples=False) as drive,
         subprocess.Popen(
             [sys.executable, __file__, READ],
             env={**os.environ, "ROS_DOMAIN_ID": str(process.domain_id)},

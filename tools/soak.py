@@ -53,8 +53,17 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 from action import Follow, goal  # noqa: E402
-from drive import NANOSECONDS, TSP_NS, Drive, Node, ParameterRejected, joint_trajectory, own_mb, status_values, to_time  # noqa: E402
+from node_process import Node, own_mb  # noqa: E402
 from participant import NoResponse, Participant  # noqa: E402
+from virtual_axes_py.ros import (  # noqa: E402
+    NANOSECONDS,
+    TSP_NS,
+    AxesClient,
+    ParameterRejected,
+    joint_trajectory,
+    status_values,
+    to_time,
+)
 
 WEIGHTS = {
     "trajectory": 20,
@@ -147,7 +156,7 @@ MAY_GROW = {"memory_mb": (3.0, 0.02), "files": (2.5, 0.0), "threads": (1.5, 0.0)
 class SoakClock:
     """Publisher of `/clock` at a multiple of real time."""
 
-    def __init__(self, drive: Drive, speed: float):
+    def __init__(self, drive: AxesClient, speed: float):
         """Starts the clock."""
         self._publisher = drive.node.create_publisher(Clock, "/clock", 10)
         self._speed, self._end = speed, threading.Event()
@@ -169,7 +178,7 @@ class SoakClock:
 class Traffic:
     """Random sequential traffic to the node."""
 
-    def __init__(self, drive: Drive, follow: Follow, seed: int, kinds: set[str], churn: float, folder: Path):
+    def __init__(self, drive: AxesClient, follow: Follow, seed: int, kinds: set[str], churn: float, folder: Path):
         """Creates traffic of these kinds, with `churn` times the participants; files go to `folder`."""
         self.drive, self.follow = drive, follow
         self.chance = random.Random(seed)
@@ -332,7 +341,7 @@ class Traffic:
 
     def forget(self) -> None:
         """Drops the messages that this process has kept."""
-        self.drive.forget()
+        self.drive.drop_samples()
         with self.drive._changed:
             self.drive._results.clear()
             self.drive._diagnostics.clear()
@@ -350,7 +359,7 @@ def long_trajectory() -> JointTrajectory:
     return joint_trajectory(["c"], times, 0.2 * np.sin(times - 1))
 
 
-def crowd(drive: Drive) -> None:
+def crowd(drive: AxesClient) -> None:
     """Creates publishers and subscriptions that leave with their participants, with long names and types."""
     assert drive.process is not None
     kind, name = JointTrajectoryControllerState, "/crowd/of_those_who_leave_together"
@@ -360,7 +369,7 @@ def crowd(drive: Drive) -> None:
 
     for _ in range(CROWD // AT_A_TIME):
         before = count()
-        with Drive(process=drive.process, listen=False) as other:
+        with AxesClient(process=drive.process, keep_samples=False) as other:
 
             def come() -> None:
                 for _ in range(AT_A_TIME):
@@ -372,14 +381,14 @@ def crowd(drive: Drive) -> None:
             drive.wait_for(lambda: count() >= before + 2 * AT_A_TIME, 60, "the crowd")
 
 
-def announce(drive: Drive, folder: Path) -> None:
+def announce(drive: AxesClient, folder: Path) -> None:
     """Runs a participant that announces itself frequently."""
     assert drive.process is not None
     with Participant(drive.process.domain_id, "sink", 10, lease=LEASE_S, announces_s=0.005, folder=folder):
         time.sleep(CROWD * 0.005 * 1.5)
 
 
-def kill_listener(drive: Drive) -> None:
+def kill_listener(drive: AxesClient) -> None:
     """Kills a subscriber whose samples are kept until its lease expires."""
     assert drive.process is not None
     with Participant(drive.process.domain_id, "sink", 10) as participant:
@@ -387,14 +396,14 @@ def kill_listener(drive: Drive) -> None:
     time.sleep(LEASE_S + 5)
 
 
-def fill(drive: Drive, folder: Path) -> None:
+def fill(drive: AxesClient, folder: Path) -> None:
     """Fills histories and queues to their bounds."""
     kill_listener(drive)
-    drive.forget()
+    drive.drop_samples()
     crowd(drive)
-    drive.forget()
+    drive.drop_samples()
     announce(drive, folder)
-    drive.forget()
+    drive.drop_samples()
     raw = serialize_message(joint_trajectory(["q"], [0.0], [[0.0]]))
     deadline = time.monotonic() + 60
     while len(drive.results()) < FILL and time.monotonic() < deadline:
@@ -478,7 +487,7 @@ class Prober:
             raise ChildProcessError("the echo process does not respond") from None
 
 
-def look(drive: Drive, prober: Prober, memory: Memory, began: float) -> Look:
+def look(drive: AxesClient, prober: Prober, memory: Memory, began: float) -> Look:
     """Returns the present figures of the process."""
     assert drive.process is not None
     pid = drive.process.pid
@@ -546,7 +555,7 @@ def verdict(looks: list[Look]) -> bool:
     return grew
 
 
-def run(drive: Drive, prober: Prober, traffic: Traffic, seconds: float) -> tuple[list[Look], dict[str, str]]:
+def run(drive: AxesClient, prober: Prober, traffic: Traffic, seconds: float) -> tuple[list[Look], dict[str, str]]:
     """Runs traffic for a duration; returns the looks and the node's final diagnostics, if the run was not aborted."""
     process = drive.process
     assert process is not None
@@ -606,7 +615,7 @@ def main() -> int:
     chosen = named if args.only else set(known) - named
     real = args.speed == 1
     mode = ["-p", "time:=real"] if real else ["-p", "use_sim_time:=true"]
-    with Node([*mode, "-p", "max_points:=20000"]) as process, Drive(process=process, connect=False) as drive:
+    with Node([*mode, "-p", "max_points:=20000"]) as process, AxesClient(process=process, connect=False) as drive:
         clock = None if real else SoakClock(drive, args.speed)
         drive.connect(30)
         with tempfile.TemporaryDirectory() as folder:

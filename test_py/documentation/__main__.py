@@ -7,7 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from drive import DomainId, node_binary
+from node_process import DomainId, node_binary
 
 from .page import Page
 from .place import Place

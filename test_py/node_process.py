@@ -134,7 +134,7 @@ class Node:
             self._own_domain.release()
 
     def start(self) -> None:
-        """Starts the program; `Drive(process=...)` waits until it is discovered."""
+        """Starts the program; `AxesClient(process=...)` waits until it is discovered."""
         self._process = subprocess.Popen(
             self._command,
             env=self._env,

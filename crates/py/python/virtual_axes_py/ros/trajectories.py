@@ -24,7 +24,7 @@ def to_time(stamp_ns: int) -> Time:
 
 def to_ns(stamp: Time) -> int:
     """Returns integer ns from a ROS time."""
-    return stamp.sec * NANOSECONDS + stamp.nanosec
+    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
 
 
 def joint_trajectory(
@@ -43,7 +43,7 @@ def joint_trajectory(
     nanoseconds = np.rint(np.asarray(times, dtype=float) * NANOSECONDS).astype(np.int64)
     seconds, rest = np.divmod(nanoseconds, NANOSECONDS)
 
-    def rows(values: Any) -> Iterable[array.array]:
+    def rows(values: Any) -> Iterable[array.array[float]]:
         if values is None:
             return itertools.repeat(array.array("d"))
         table = np.ascontiguousarray(values, dtype=np.float64).reshape(len(nanoseconds), -1)

@@ -60,7 +60,7 @@ class Recording:
     start: int
     """Time 0 of the trajectory, ns."""
     joints: Series
-    """`joint_states`: position, velocity (m, m/s; rad, rad/s), effort (N, N.m)."""
+    """`joint_states`: position, velocity (m, m/s; rad, rad/s), effort (N, N·m)."""
     currents: Series
     """`~/motor_currents`: current, current_setpoint, friction, gravity, load (A), saturated."""
     states: Series
@@ -77,16 +77,18 @@ class Recording:
         """Returns a mask of the joint states from span[0] to span[1], s from the start."""
         return (self.time >= span[0]) & (self.time <= span[1])
 
-    def tracking_error(self, joint: str) -> np.ndarray:
-        """Returns the following error PSEC - SP at all position cycles; contains the pure delay."""
-        return self.states["psec", joint] - self.states["position", joint]
+    def following_error(self, joint: str) -> np.ndarray:
+        """Returns the following error PSEC − SP at all position cycles, m or rad; it contains the pure delay."""
+        error: np.ndarray = self.states["psec", joint] - self.states["position", joint]
+        return error
 
-    def synchronized_tracking_error(self, joint: str, alpha_periods: float = 1.5) -> np.ndarray:
-        """Returns the delay-compensated following error PSEC_floor(k - alpha) - SP_k."""
+    def delay_compensated_following_error(self, joint: str, alpha_periods: float = 1.5) -> np.ndarray:
+        """Returns the delay-compensated following error PSEC(k − ⌈α⌉) − SP(k), m or rad; α in position cycles."""
         shift = math.ceil(alpha_periods)
         psec = self.states["psec", joint]
         delayed = np.concatenate([np.full(shift, psec[0]), psec])[: len(psec)]
-        return delayed - self.states["position", joint]
+        error: np.ndarray = delayed - self.states["position", joint]
+        return error
 
     def radial_deviation(
         self, center: tuple[float, float], radius: float, axes: tuple[str, str] = ("x", "y")

@@ -1,5 +1,8 @@
 """Quality of service of the topics, for clients of the axes."""
 
+# rclpy has few type hints.
+# mypy: disallow-untyped-calls=False
+
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 PSEC_QOS = QoSProfile(depth=64, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
