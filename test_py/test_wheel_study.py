@@ -39,7 +39,7 @@ def machine() -> va.Machine:
 @pytest.fixture(scope="module")
 def client() -> Iterator[Client]:
     """Yields a client of two workers with one thread each."""
-    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "host": "127.0.0.1"}
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": "127.0.0.1:0", "host": "127.0.0.1"}
     with LocalCluster(**options) as local, Client(local) as one:
         yield one
 
@@ -208,12 +208,18 @@ def rms(machine: va.Machine) -> float:
     return machine.simulate(va.scenario("ballbar"), figures="contour").figures["contour_error_um"]["rms"]
 
 
-def test_a_search_finds_a_better_machine_and_respects_margins(machine: va.Machine) -> None:
+def test_a_search_finds_a_better_machine_and_respects_margins(machine: va.Machine, client: Client) -> None:
     machine = machine.with_(START)
     free = va.optimize(machine, va.scenario("ballbar"), SEARCHED, "contour_error_um.rms", trials=128, seed=1)
     assert free.value == rms(free.machine) < rms(machine)
     first = free.study.trials[0]
     assert first.value == rms(machine) and first.params == START
+    search = {"trials": 64, "seed": 1}
+    here, there = (
+        va.optimize(machine, va.scenario("ballbar"), SEARCHED, "contour_error_um.rms", executor=executor, **search)
+        for executor in (None, client)
+    )
+    assert (here.value, here.changes) == (there.value, there.changes)
     limits = {"margin.modulus": (0.65, None), "axes.x.peak_current_a": (None, 40.0)}
     search = {"trials": 128, "seed": 1, "constraints": limits}
     safe = va.optimize(machine, va.scenario("ballbar"), SEARCHED, "contour_error_um.rms", **search)

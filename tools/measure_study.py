@@ -7,9 +7,9 @@
 The cluster has two workers of one thread each, the sweep in one process two threads. The parts of the study alternate
 between both, so that other load on the machine strikes both alike. Workers are started and imports done before.
 
-The table of larger clusters is calculated from the measured durations, for a million designs in Parquet files: the
-chunks that `sweep` would choose, the time that driver and scheduler need of the time of the workers, and the share of
-the last chunks, while other workers are idle already.
+The table of larger clusters is calculated from the measured durations, for a study of ten minutes with results in
+Parquet files: its designs, the chunks that `sweep` would choose, the part of the time in which driver and scheduler are
+busy, and that of the last chunk of a worker, while others may be idle already.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ BOUNDS = {
     for axis in "xy"
     for key, bounds in {"n2": (8, 20), "nu": (1, 6), "lambda_rel": (0.01, 1.0)}.items()
 }
-MILLION = 1_000_000
+DURATION = 600.0
+"""Duration of the study in the table, s."""
 SIZE = 256
 """Variants of the chunk whose handling is measured."""
 
@@ -51,11 +52,13 @@ def handling(client: Client, setup: chunks.Setup, designs: study.RandomVariants,
 
 def print_bounds(overhead: cluster.Overhead, handled: float) -> None:
     """Prints the table of larger clusters."""
-    print("workers  chunk  driver and scheduler  last chunks")
+    print("workers    designs  chunk  driver and scheduler  last chunk")
     for workers in (2, 20, 200):
-        size = study.chunk_size(overhead, MILLION, workers)
-        busy = workers * handled / (size * overhead.per_variant)
-        print(f"{workers:7}  {size:5}  {100 * busy:19.1f}%  {100 * size * workers / MILLION:10.1f}%")
+        designs = int(workers * DURATION / overhead.per_variant)
+        size = study.chunk_size(overhead, designs, workers)
+        seconds = size * overhead.per_variant
+        busy, last = workers * handled / seconds, seconds / DURATION
+        print(f"{workers:7}  {designs:9}  {size:5}  {100 * busy:18.1f} %  {100 * last:8.1f} %")
     most = study.CHUNK * overhead.per_variant / handled
     print(f"workers that driver and scheduler can serve, with chunks of {study.CHUNK}: {most:.0f}")
 
@@ -99,7 +102,12 @@ def main() -> None:
     machine = machine.with_({f"{axis}.position_loop.controller": "gpc" for axis in machine.axes})
     setup = chunks.Setup(machine, va.scenario("ballbar"), "axes", 1)
     designs = va.random_variants(1, arguments.designs, BOUNDS)
-    options_of_cluster = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "host": "127.0.0.1"}
+    options_of_cluster = {
+        "n_workers": 2,
+        "threads_per_worker": 1,
+        "dashboard_address": "127.0.0.1:0",
+        "host": "127.0.0.1",
+    }
     with LocalCluster(**options_of_cluster) as local, Client(local) as client:
         cluster.measure(client, setup, designs[:32])
         overhead = cluster.measure(client, setup, designs[:32], 50)

@@ -88,7 +88,10 @@ def optimize(
     while (count := min(batch, trials - _taken(study))) > 0:
         asked = [study.ask(distributions) for _ in range(count)]
         variants = [dict(trial.params) for trial in asked]
-        results = sweep(machine, variants, motion, figures=figures, executor=executor, threads=threads, progress=False)
+        chunk = _chunk(count, executor)
+        results = sweep(
+            machine, variants, motion, figures=figures, executor=executor, threads=threads, chunk=chunk, progress=False
+        )
         for trial, result in zip(asked, results):
             margins = _margins(machine.with_(result.changes), axes) if needs_margins and not result.error else {}
             _tell(study, trial, result, objective, limits, margins)
@@ -108,6 +111,15 @@ def _open(storage: str | Path | None, name: str, seed: int | None) -> optuna.Stu
     # The liar keeps the trials of a batch and of other processes apart, whose values are not known yet.
     sampler = optuna.samplers.TPESampler(seed=seed, constant_liar=True, n_startup_trials=32)
     return optuna.create_study(storage=journal, sampler=sampler, study_name=name, load_if_exists=journal is not None)
+
+
+def _chunk(count: int, executor: Client | None) -> int:
+    """Returns the number of variants in a chunk, one chunk per thread of a cluster."""
+    if executor is None:
+        return count
+    from . import cluster
+
+    return -(-count // max(cluster.thread_count(executor), 1))
 
 
 def _distribution(key: str, bounds: Bounds) -> optuna.distributions.BaseDistribution:
