@@ -97,6 +97,8 @@ def test_a_program_runs_to_its_end_with_feedback_and_figures(programs: Follow) -
     fastest = max(feedback.feed for feedback in sent.feedback if feedback.line == 3)
     assert 0.02 < fastest <= 0.05 * (1 + 1e-9)
     assert {f.programmed_feed for f in sent.feedback if f.line == 3} == {0.05}
+    errors = [feedback.contour_error for feedback in sent.feedback]
+    assert all(0 <= error <= result.max_contour_error for error in errors) and max(errors) > 0
     statuses = [result.status for result in results_of(programs, sent)]
     assert statuses == [R.ACCEPTED, R.COMPLETED]
     assert {result.source for result in results_of(programs, sent)} == {R.SOURCE_PROGRAM}
@@ -128,6 +130,16 @@ def test_a_start_line_skips_earlier_motions(programs: Follow) -> None:
     assert result.error_code == Result.SUCCESSFUL, result.error_string
     assert result.programmed_time == pytest.approx(0.8, rel=1e-9)
     assert set(result.worst_line) == {5, 6}
+
+
+def test_a_start_line_in_tool_center_point_control(programs: Follow) -> None:
+    text = "G21 G90 G54 G43.4 H1 G61.1\nG1 X5 F3000\nX20 A10 C20\nX30 A5\nG49\nM2\n"
+    sent = programs.send(Goal(program=text, start_line=4))
+    result = sent.ended(60).result
+    assert result.error_code == Result.SUCCESSFUL, result.error_string
+    # 10 mm at 3 m/min; the approach is a rapid traverse.
+    assert result.programmed_time == pytest.approx(0.2, rel=1e-9)
+    assert_within_limits(states_of(programs, sent))
 
 
 def test_the_feed_override_of_a_goal_and_a_feed_hold(programs: Follow) -> None:

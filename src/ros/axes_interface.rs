@@ -100,6 +100,8 @@ pub struct ProgramPlace {
     pub motion: MotionId,
     /// Place on the path.
     pub place: PathPlace,
+    /// Contour error at the end of the position cycle, m; NaN if unknown.
+    pub contour_error: f64,
 }
 
 /// Samples of all axes at one position cycle.

@@ -66,8 +66,10 @@ impl Axes {
         simulation.step();
         stream.check_gaps(simulation);
         let time = simulation.time_of(instant);
-        let track =
-            |track: &mut ProgramMonitor| track.update(time, simulation.path_place(), simulation.samples());
+        let track = |track: &mut ProgramMonitor| {
+            let error = simulation.contour_error(track.motion);
+            track.update(time, simulation.path_place(), simulation.samples(), error)
+        };
         let place = program.as_mut().and_then(track);
         frames.acquire(|frame| {
             frame.instant = instant;

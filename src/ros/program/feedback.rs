@@ -46,6 +46,7 @@ impl ProgramFeedbackOutput {
             feed: program.place.path_rate,
             programmed_feed: program.place.programmed_feed,
             feed_override: frame.feed_rate,
+            contour_error: program.contour_error,
             name: self.joints.clone(),
             tracking_error: errors.collect(),
         };

@@ -35,12 +35,14 @@ impl ProgramMonitor {
         Self { motion, linear, first: None, last: 0, worst_lines }
     }
 
-    /// Adds the position cycle at `time`, ns, with its place on the path; returns the place after the program has begun.
+    /// Adds the position cycle at `time`, ns, with its place on the path and its contour error, m; returns the place after
+    /// the program has begun.
     pub fn update(
         &mut self,
         time: Nanoseconds,
         place: Option<PathPlace>,
         samples: &[AxisSample],
+        contour_error: Option<f64>,
     ) -> Option<ProgramPlace> {
         let place = place.filter(|place| place.line > 0 || self.first.is_some())?;
         self.first.get_or_insert(time);
@@ -48,7 +50,8 @@ impl ProgramMonitor {
         let error = |&axis: &usize| samples.get(axis).map_or(0.0, |s| s.delay_compensated_following_error());
         let square: f64 = self.linear.iter().map(|axis| error(axis).powi(2)).sum();
         self.add(place.line, square.sqrt());
-        Some(ProgramPlace { motion: self.motion, place })
+        let contour_error = contour_error.unwrap_or(f64::NAN);
+        Some(ProgramPlace { motion: self.motion, place, contour_error })
     }
 
     fn add(&mut self, line: usize, error: f64) {
@@ -76,17 +79,17 @@ mod tests {
         let mut track = ProgramMonitor::new(MotionId(1), vec![1]);
         let sample =
             |error: f64| [AxisSample::default(), AxisSample { delayed_psec: error, ..AxisSample::default() }];
-        assert_eq!(track.update(5, None, &sample(9.0)), None);
-        assert_eq!(track.update(10, Some(PathPlace::default()), &sample(9.0)), None);
+        assert_eq!(track.update(5, None, &sample(9.0), None), None);
+        assert_eq!(track.update(10, Some(PathPlace::default()), &sample(9.0), None), None);
         for line in 1..=100_usize {
             let place = PathPlace { line, ..PathPlace::default() };
             let error = if line % 2 == 0 { line as f64 } else { -0.5 };
             assert_eq!(
-                track.update(10 * line as i64 + 10, Some(place), &sample(error)).unwrap().place,
-                place
+                track.update(10 * line as i64 + 10, Some(place), &sample(error), Some(error)),
+                Some(ProgramPlace { motion: MotionId(1), place, contour_error: error })
             );
         }
-        track.update(2000, None, &sample(0.0));
+        track.update(2000, None, &sample(0.0), None);
         let figures = track.finish(10);
         assert_eq!(figures.cycle_time, 1000);
         assert_eq!(figures.worst_lines.len(), WORST_LINES);

@@ -111,8 +111,8 @@ impl Planning {
         // The sender is dropped if the motion is canceled before its start, or at shutdown.
         let Ok(rest) = rest.blocking_recv() else { return Ok(()) };
         let options = InterpreterOptions::for_machine(&machine).starting_at(&rest);
-        let start = options.start;
-        let steps = StartLine::new(Interpreter::new(reader, &name, options), start_line, start);
+        let steps = Interpreter::new(reader, &name, options.clone());
+        let steps = StartLine::new(steps, start_line, &options);
         let named = |error: FeedPlanError| match error {
             // The interpreter's error names the file.
             FeedPlanError::Step(error) if error.is::<virtual_axes_nc::interpret::ProgramError>() => {

@@ -105,6 +105,13 @@ impl MotionAssessor {
         }
     }
 
+    /// Returns the contour error at the last tick of the position cycle that was observed last, m; `None` without a
+    /// linear axis or before the first cycle.
+    pub fn contour_error(&self) -> Option<f64> {
+        let has_error = self.ticks > 0 && !self.linear.is_empty();
+        self.feet.square_distance.last().filter(|_| has_error).map(|square| square.sqrt())
+    }
+
     /// Returns the figures so far.
     pub fn report(&self) -> MotionReport {
         let has_path = !self.linear.is_empty();

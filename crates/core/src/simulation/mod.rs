@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use crate::config::{AxisKind, MachineConfig};
 use crate::machine::{AxisSample, Machine, MachineError, MachineParameters, SimdWidth};
-use crate::trajectory::{JointLimits, PathPlace, Timeline, TimelineError, TimelineEvent};
+use crate::trajectory::{JointLimits, MotionId, PathPlace, Timeline, TimelineError, TimelineEvent};
 use crate::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS};
 
 use loads::AxisLoads;
@@ -311,6 +311,12 @@ impl Simulation {
     /// Returns the place on the path of the active motion that is planned while it runs.
     pub fn path_place(&self) -> Option<PathPlace> {
         self.timeline.path_place()
+    }
+
+    /// Returns the distance of the linear axes from the path of the setpoints of the running motion `id` at the end of the
+    /// last position cycle, m; `None` if there is none.
+    pub fn contour_error(&self, id: MotionId) -> Option<f64> {
+        self.motions.contour_error(id)
     }
 
     /// Returns true if a trajectory or a stop moves the setpoints.

@@ -306,4 +306,10 @@ impl ActiveMotions {
             assessor.observe(machine);
         }
     }
+
+    /// Returns the contour error of the running motion `id` at the end of the last position cycle, m.
+    pub(super) fn contour_error(&self, id: MotionId) -> Option<f64> {
+        let motion = self.list.iter().find(|motion| motion.id == id)?;
+        motion.assessor.as_ref().and_then(MotionAssessor::contour_error)
+    }
 }

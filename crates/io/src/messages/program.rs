@@ -40,6 +40,7 @@ pub struct RunProgramFeedback {
     pub feed: f64,
     pub programmed_feed: f64,
     pub feed_override: f64,
+    pub contour_error: f64,
     pub name: Vec<String>,
     pub tracking_error: Vec<f64>,
 }

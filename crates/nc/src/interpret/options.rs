@@ -113,11 +113,17 @@ impl TipTransform {
     /// Computes the joint positions of the machine, in its order, at a position of a motion. `tcp_length` is
     /// [`ProgramMotion::tcp_length`](crate::motion::ProgramMotion::tcp_length).
     pub fn joints(&self, position: &Coordinates, tcp_length: Option<f64>) -> Vec<f64> {
+        let position = self.positions(position, tcp_length);
+        self.joints.iter().map(|axis| axis.map_or(0.0, |axis| position[axis])).collect()
+    }
+
+    /// Computes the axis positions at a position of a motion, as [`joints`](Self::joints) does.
+    pub fn positions(&self, position: &Coordinates, tcp_length: Option<f64>) -> Coordinates {
         let mut position = *position;
         if let Some(length) = tcp_length {
             self.axis_positions(&mut position, length);
         }
-        self.joints.iter().map(|axis| axis.map_or(0.0, |axis| position[axis])).collect()
+        position
     }
 
     /// Converts axis positions to the tip of a tool, in machine coordinates with the tables at 0.
