@@ -17,3 +17,4 @@ mod reference;
 mod run_part_program;
 mod tune_command;
 mod warnings;
+mod worst_line;

@@ -187,3 +187,20 @@ fn the_page_has_the_worst_line_and_the_feed_along_the_path() {
     let size = fs::metadata(long_page).expect("a page").len();
     assert!(size < 4 * page.len() as u64, "{size} {}", page.len());
 }
+
+#[test]
+fn orientation_errors_of_lines_are_those_of_the_run() {
+    let folder = TestFolder::new("part_program_orientation");
+    let name = program(&folder, "G43.4 H1 G64 P0.05\nG1 X20 A5 F3000\nX40 A15 C30\nX60 A5 C90\nG49\nM2\n");
+    let result = json(&["run", &name, "--json"]);
+    let run = &result["runs"][0];
+    let whole = run["orientation_error_mdeg"]["max"].as_f64().expect("an orientation error");
+    let lines = run["part_program"]["worst_lines"].as_array().expect("lines");
+    let of_lines = lines.iter().map(|line| line["orientation_error_mdeg"].as_f64().expect("an error"));
+    let largest = of_lines.fold(0.0, f64::max);
+    // Lines are evaluated at position cycles, the run at all ticks.
+    assert!(largest <= whole * 1.001 && largest > 0.9 * whole, "{largest} {whole}");
+    assert!(printed(&["run", &name]).contains("orientation error, mdeg"));
+    let name = program(&folder, "G1 X20 F3000\nM2\n");
+    assert!(!printed(&["run", &name]).contains("orientation error, mdeg"));
+}

@@ -11,7 +11,6 @@ use virtual_axes_core::path::Program;
 use virtual_axes_core::scenario::{Scenario, is_file_name, nearest_input};
 use virtual_axes_core::text::{escaped, nearest_hint};
 use virtual_axes_core::trial::{self, Measures, SetpointSource, Tick, Trial};
-use virtual_axes_core::units::seconds;
 use virtual_axes_io::files::{self, FileKind};
 
 use crate::input::CommandInput;
@@ -157,7 +156,10 @@ fn part_program(
     name: &str,
     machine: &MachineConfig,
 ) -> Result<String, Box<dyn Error>> {
-    let mut summary = part_program::check(&arguments.file, machine, &arguments.part_program.ignore)?;
+    let ignored = &arguments.part_program.ignore;
+    let lines = part_program::count_lines(&arguments.file).map_err(|error| format!("{name}: {error}"))?;
+    let mut progress = TrialProgress::with_lines(name, lines, arguments.json);
+    let mut summary = part_program::check(&arguments.file, machine, ignored, &mut progress)?;
     let input = CommandInput::open(name, None)?.with_part_program(&arguments.part_program)?;
     let SetpointSource::Grid(mut source) = input.setpoints(machine, None)? else {
         return Err(format!("{name}: a part program without setpoints").into());
@@ -165,11 +167,11 @@ fn part_program(
     let joints = source.joints().to_vec();
     let mut audit = LimitAudit::new(machine);
     let (mut row, mut psec) = (vec![0.0; joints.len()], vec![0.0; machine.axes().len()]);
-    let mut progress = TrialProgress::new(name, None, arguments.json);
+    progress = TrialProgress::with_lines(name, lines, arguments.json);
     let mut time = 0;
     while source.next(&mut row).map_err(|error| -> Box<dyn Error> { error })? {
         interrupt::check()?;
-        progress.set_time(seconds(time));
+        progress.set_line(input.track().borrow().lines_read);
         for (&joint, &position) in joints.iter().zip(&row) {
             if let Some(psec) = psec.get_mut(joint) {
                 *psec = position;

@@ -7,10 +7,11 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::part_program::is_part_program;
+use crate::part_program::{count_lines, is_part_program};
 use crate::part_program_arguments::PartProgramArguments;
 use crate::part_program_source::{PartProgramOptions, PartProgramSource, ProgramTrack};
 use crate::print_error;
+use crate::progress::TrialProgress;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::path::Program;
 use virtual_axes_core::scenario::Scenario;
@@ -117,6 +118,28 @@ impl CommandInput {
     /// Returns lines and times of the setpoints of a part program that were read.
     pub fn track(&self) -> &RefCell<ProgramTrack> {
         &self.track
+    }
+
+    /// Creates the progress: by the lines of a part program, otherwise by the simulated duration, s, if it is known.
+    /// `is_quiet` hides it.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the lines of a part program cannot be counted.
+    pub fn progress(&self, duration: Option<f64>, is_quiet: bool) -> Result<TrialProgress, String> {
+        if !self.is_part_program() {
+            return Ok(TrialProgress::new(&self.name, duration, is_quiet));
+        }
+        let lines = count_lines(Path::new(&self.name)).map_err(|error| format!("{}: {error}", self.name))?;
+        Ok(TrialProgress::with_lines(&self.name, lines, is_quiet))
+    }
+
+    /// Reports the lines of a part program that were read, otherwise the simulated time, s.
+    pub fn report_progress(&self, progress: &mut TrialProgress, time: f64) {
+        match self.content {
+            Content::PartProgram => progress.set_line(self.track.borrow().lines_read),
+            _ => progress.set_time(time),
+        }
     }
 
     /// Returns the name of the scenario or file.

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::f64::consts::FRAC_PI_2;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{self, BufRead, BufReader};
 use std::path::Path;
 
 use virtual_axes_core::config::{AxisKind, MachineConfig};
@@ -14,6 +14,7 @@ use virtual_axes_nc::motion::{Coordinates, Feed, MotionKind, ProgramEvent, Progr
 
 use crate::interrupt;
 use crate::program_text::joint_line;
+use crate::progress::TrialProgress;
 
 /// Extensions of part programs.
 const EXTENSIONS: [&str; 8] = ["nc", "ngc", "tap", "cnc", "mpf", "gcode", "iso", "eia"];
@@ -28,16 +29,41 @@ pub fn is_part_program(file: &Path) -> bool {
     extension.is_some_and(|extension| EXTENSIONS.iter().any(|known| extension.eq_ignore_ascii_case(known)))
 }
 
+/// Returns the number of lines of a file.
+///
+/// # Errors
+///
+/// Returns an error of the operating system.
+pub fn count_lines(file: &Path) -> io::Result<u64> {
+    let mut reader = BufReader::new(File::open(file)?);
+    let (mut lines, mut is_open) = (0, false);
+    loop {
+        let bytes = reader.fill_buf()?;
+        let Some(last) = bytes.last() else { return Ok(lines + u64::from(is_open)) };
+        lines += bytes.iter().filter(|byte| **byte == b'\n').count() as u64;
+        is_open = *last != b'\n';
+        let length = bytes.len();
+        reader.consume(length);
+    }
+}
+
 /// Validates words, axes and travel limits of a part program on a machine and returns a summary.
-pub fn check(file: &Path, machine: &MachineConfig, ignored: &[u32]) -> Result<String, Box<dyn Error>> {
+pub fn check(
+    file: &Path,
+    machine: &MachineConfig,
+    ignored: &[u32],
+    progress: &mut TrialProgress,
+) -> Result<String, Box<dyn Error>> {
     let name = file.to_string_lossy();
     let source = BufReader::new(File::open(file).map_err(|error| format!("{name}: {error}"))?);
     let mut options = InterpreterOptions::for_machine(machine);
     options.ignored_m_codes = ignored.to_vec();
     let transform = TipTransform::new(machine);
     let mut summary = ProgramSummary::new(&transform.joints(&options.start, None));
-    for step in Interpreter::new(source, &escaped(&name), options) {
+    let mut steps = Interpreter::new(source, &escaped(&name), options);
+    while let Some(step) = steps.next() {
         interrupt::check()?;
+        progress.set_line(steps.line());
         match step? {
             ProgramStep::Motion(motion) => {
                 summary.add(&motion, &transform);

@@ -82,6 +82,8 @@ pub struct ProgramTrack {
     pub cycle_time: f64,
     /// Duration of all motions at their programmed feed, s.
     pub programmed_time: f64,
+    /// Farthest source line that was read, from 1.
+    pub lines_read: usize,
     /// Ignored M codes of the lines read.
     pub ignored_codes: BTreeMap<u32, IgnoredCode>,
     /// First line with a stop (M0, M1), which the simulation passes without a wait.
@@ -118,6 +120,7 @@ impl Iterator for NotedSteps<'_> {
     fn next(&mut self) -> Option<Self::Item> {
         let step = self.interpreter.next();
         let mut track = self.track.borrow_mut();
+        track.lines_read = track.lines_read.max(self.interpreter.line());
         let codes = self.interpreter.ignored_codes();
         if !codes.is_empty() {
             track.ignored_codes.clone_from(codes);

@@ -13,18 +13,18 @@ use crate::interrupt;
 
 /// Duration of work below which no progress is shown.
 const SHOW_AFTER: Duration = Duration::from_secs(1);
-/// Number of position cycles between two reads of the clock.
-const CYCLES_PER_CHECK: u32 = 256;
+/// Number of reports between two reads of the clock.
+const CALLS_PER_CHECK: u32 = 256;
 /// Steps of the bar per simulated second.
 const STEPS_PER_SECOND: f64 = 1000.0;
 
-/// Progress of a trial: a bar, or a counter if the duration is unknown. Hidden if standard error is no
-/// terminal.
+/// Progress of a trial or a part program: a bar, or a counter if the duration is unknown. Hidden if standard error is
+/// no terminal.
 #[derive(Debug)]
 pub struct TrialProgress {
     bar: ProgressBar,
     began: Instant,
-    cycles: u32,
+    calls: u32,
     is_shown: bool,
     is_quiet: bool,
 }
@@ -32,39 +32,67 @@ pub struct TrialProgress {
 impl TrialProgress {
     /// Creates the progress of `name` with its simulated duration, s, if it is known; `is_quiet` hides it.
     pub fn new(name: &str, duration: Option<f64>, is_quiet: bool) -> Self {
-        let bar = ProgressBar::with_draw_target(
-            duration.map(|duration| (duration * STEPS_PER_SECOND) as u64),
-            ProgressDrawTarget::hidden(),
-        );
         let template = match duration {
             Some(_) => "{prefix} {wide_bar} {percent} %, {eta} left",
             None => "{prefix} {spinner} {msg}",
         };
+        let steps = duration.map(|duration| (duration * STEPS_PER_SECOND) as u64);
+        Self::with_template(name, steps, template, is_quiet)
+    }
+
+    /// Creates the progress of the part program `name` by its source lines; `is_quiet` hides it.
+    pub fn with_lines(name: &str, lines: u64, is_quiet: bool) -> Self {
+        let template = "{prefix} {wide_bar} line {pos} of {len}, {eta} left";
+        Self::with_template(name, Some(lines), template, is_quiet)
+    }
+
+    fn with_template(name: &str, length: Option<u64>, template: &str, is_quiet: bool) -> Self {
+        let bar = ProgressBar::with_draw_target(length, ProgressDrawTarget::hidden());
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
         bar.set_prefix(name.to_owned());
-        TrialProgress { bar, began: Instant::now(), cycles: 0, is_shown: false, is_quiet }
+        TrialProgress { bar, began: Instant::now(), calls: 0, is_shown: false, is_quiet }
     }
 
-    /// Reports that `time` s have been simulated.
-    pub fn set_time(&mut self, time: f64) {
-        self.cycles = (self.cycles + 1) % CYCLES_PER_CHECK;
-        if self.cycles != 0 || self.is_quiet || self.began.elapsed() < SHOW_AFTER {
-            return;
+    /// Returns true if the bar is to be drawn.
+    fn is_due(&mut self) -> bool {
+        self.calls = (self.calls + 1) % CALLS_PER_CHECK;
+        if self.calls != 0 || self.is_quiet || self.began.elapsed() < SHOW_AFTER {
+            return false;
         }
         if !self.is_shown {
             // The bar remains hidden if standard error is no terminal.
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
             self.is_shown = true;
         }
-        self.bar.set_position((time * STEPS_PER_SECOND) as u64);
-        self.bar.set_message(format!("{time:.0} s simulated"));
+        true
+    }
+
+    /// Reports that `time` s have been simulated.
+    pub fn set_time(&mut self, time: f64) {
+        if self.is_due() {
+            self.bar.set_position((time * STEPS_PER_SECOND) as u64);
+            self.bar.set_message(format!("{time:.0} s simulated"));
+        }
+    }
+
+    /// Reports that the lines of a part program have been read up to `line`, from 1.
+    pub fn set_line(&mut self, line: usize) {
+        if self.is_due() {
+            self.bar.set_position(line as u64);
+        }
     }
 
     /// Removes the bar.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+impl Drop for TrialProgress {
+    fn drop(&mut self) {
+        self.finish();
     }
 }
 

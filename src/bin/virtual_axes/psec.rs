@@ -4,8 +4,10 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use virtual_axes_core::config::{DEFAULT_MACHINE, Parameters};
+use virtual_axes_core::path::Program;
 use virtual_axes_core::simulation::joint_limits;
 use virtual_axes_core::trial::SetpointSource;
+use virtual_axes_core::units::seconds;
 use virtual_axes_io::files::psec_writer;
 
 use crate::input::{CommandInput, must_not_replace};
@@ -89,11 +91,14 @@ fn write_scenario(
     let mut writer = psec_writer(&arguments.out, &names)?;
     let mut row = vec![0.0; names.len()];
     let mut time = 0;
+    let mut progress = input.progress(program.as_deref().map(Program::duration), false)?;
     while source.next(&mut row).map_err(|error| -> Box<dyn Error> { error })? {
         interrupt::check()?;
+        input.report_progress(&mut progress, seconds(time));
         writer.row(time, &row)?;
         time += config.periods().position;
     }
+    progress.finish();
     writer.finish()?;
     input.print_program_notes();
     Ok(String::new())

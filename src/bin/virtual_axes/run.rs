@@ -15,7 +15,6 @@ use virtual_axes_io::files::{TraceWriter, trace_writer};
 use crate::input::CommandInput;
 use crate::output_arguments::{OutputArguments, OutputFormat};
 use crate::period::PeriodArgument;
-use crate::progress::TrialProgress;
 use crate::report::ReportMachine;
 use crate::setpoint_summary::SetpointSummary;
 use crate::trial_arguments::TrialArguments;
@@ -135,7 +134,7 @@ fn trial(
     };
     let setpoints = input.setpoints(config, program)?;
     let mut progress =
-        TrialProgress::new(input.name(), program.map(|p| p.duration()), arguments.output.is_quiet());
+        input.progress(program.map(|program| program.duration()), arguments.output.is_quiet())?;
     let mut trace = match &arguments.trace {
         Some(path) => Some(TraceRecorder::new(path, arguments.trace_period, config)?),
         None => None,
@@ -150,7 +149,7 @@ fn trial(
         }
         if tick.position_instant {
             interrupt::check()?;
-            progress.set_time(seconds(tick.time));
+            input.report_progress(&mut progress, seconds(tick.time));
         }
         trace.as_mut().map_or(Ok(()), |trace| trace.observe(tick))
     };

@@ -7,10 +7,10 @@ use std::io::{self, BufRead, BufReader};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use virtual_axes_core::config::{AxisKind, MachineConfig};
-use virtual_axes_core::kinematics::Kinematics;
+use virtual_axes_core::kinematics::{Kinematics, ToolPose};
 use virtual_axes_core::text::escaped;
 use virtual_axes_core::trial::Tick;
-use virtual_axes_core::units::{Nanoseconds, seconds};
+use virtual_axes_core::units::{MILLIDEGREE, Nanoseconds, seconds};
 use virtual_axes_report::{Section, Table, TableColumn};
 
 use crate::feed_along_path::FeedAlongPath;
@@ -73,7 +73,9 @@ pub struct WorstLine {
     pub text: String,
     /// Contour error, m.
     pub error: f64,
-    /// Time of the error, s.
+    /// Largest orientation error on the line, rad: angle between the tool axis and that of the nearest setpoint.
+    pub orientation: f64,
+    /// Time of the contour error, s.
     pub time: f64,
     /// Cause of the error.
     pub cause: Cause,
@@ -131,17 +133,21 @@ impl ProgramFigures {
                 format!("{:.3}", worst.time),
             ]
         };
-        Table {
-            caption: String::new(),
-            columns: vec![
-                column("line", ""),
-                column("text", ""),
-                column("cause", ""),
-                column("contour error", "µm"),
-                column("time", "s"),
-            ],
-            rows: self.worst_lines.iter().map(row).collect(),
+        let mut columns = vec![
+            column("line", ""),
+            column("text", ""),
+            column("cause", ""),
+            column("contour error", "µm"),
+            column("time", "s"),
+        ];
+        let mut rows: Vec<Vec<String>> = self.worst_lines.iter().map(row).collect();
+        if self.worst_lines.iter().any(|worst| worst.orientation > 0.0) {
+            columns.insert(4, column("orientation error", "mdeg"));
+            for (row, worst) in rows.iter_mut().zip(&self.worst_lines) {
+                row.insert(4, format!("{:.2}", worst.orientation / MILLIDEGREE));
+            }
         }
+        Table { caption: String::new(), columns, rows }
     }
 
     /// Returns all figures as JSON.
@@ -152,6 +158,7 @@ impl ProgramFigures {
                 "text": worst.text,
                 "cause": worst.cause.text(),
                 "contour_error_um": worst.error * 1e6,
+                "orientation_error_mdeg": worst.orientation / MILLIDEGREE,
                 "time_s": worst.time,
             })
         };
@@ -165,15 +172,15 @@ impl ProgramFigures {
 
 /// Setpoint with its line.
 struct TrackedSetpoint {
-    tip: Vector3<f64>,
+    pose: ToolPose,
     joints: Vec<f64>,
     place: TrackPoint,
     /// Programmed feed of the tool tip, m/s; NaN where rotary axes move alone.
     tip_feed: f64,
 }
 
-/// Contour errors by source line: distance of the simulated tool tip from the polyline of the setpoints' tips, at each
-/// position cycle.
+/// Contour and orientation errors by source line: distance of the simulated tool tip from the polyline of the setpoints'
+/// tips, and angle between the tool axes at the nearest point, at each position cycle.
 pub struct LineErrors {
     kinematics: Kinematics,
     names: Vec<String>,
@@ -181,14 +188,16 @@ pub struct LineErrors {
     /// Position period, s.
     period: f64,
     window: VecDeque<TrackedSetpoint>,
-    /// Simulated tool tips with their times, ns, that wait for later setpoints.
-    tips: VecDeque<(Vector3<f64>, Nanoseconds)>,
+    /// Simulated tool poses with their times, ns, that wait for later setpoints.
+    poses: VecDeque<(ToolPose, Nanoseconds)>,
     /// Number of setpoints before the window.
     passed: usize,
     /// Worst lines with the number of their nearest setpoint until the cause is known.
     worst: Vec<(WorstLine, Option<usize>)>,
     /// Simulated tool tip of the position cycle before.
     last_tip: Option<Vector3<f64>>,
+    /// Line of the cycle before, and the largest orientation error in the cycles in a row on it, rad.
+    last_line: (usize, f64),
     feed: FeedAlongPath,
 }
 
@@ -202,10 +211,11 @@ impl LineErrors {
             is_linear: machine.axes().iter().map(|axis| axis.kind() == AxisKind::Linear).collect(),
             period: seconds(machine.periods().position),
             window: VecDeque::new(),
-            tips: VecDeque::new(),
+            poses: VecDeque::new(),
             passed: 0,
             worst: Vec::new(),
             last_tip: None,
+            last_line: (0, 0.0),
             feed: FeedAlongPath::default(),
         }
     }
@@ -226,42 +236,51 @@ impl LineErrors {
             steps.into_iter().any(|((from, to), is_linear)| *is_linear == linear && from != to)
         };
         let tip_feed = if moves(false) && !moves(true) { f64::NAN } else { place.programmed_feed };
-        let tip = self.kinematics.forward(&joints).tip;
-        self.window.push_back(TrackedSetpoint { tip, joints, place, tip_feed });
+        let pose = self.kinematics.forward(&joints);
+        self.window.push_back(TrackedSetpoint { pose, joints, place, tip_feed });
         if self.window.len() > WINDOW {
             self.window.pop_front();
             self.passed += 1;
         }
         self.explain(AFTER);
         let positions: Vec<f64> = samples().map(|sample| sample.position).collect();
-        self.tips.push_back((self.kinematics.forward(&positions).tip, tick.time));
-        if self.tips.len() > AFTER {
+        self.poses.push_back((self.kinematics.forward(&positions), tick.time));
+        if self.poses.len() > AFTER {
             self.evaluate();
         }
     }
 
-    /// Evaluates the first waiting tool tip.
+    /// Evaluates the first waiting tool pose.
     fn evaluate(&mut self) {
-        let Some((actual, time)) = self.tips.pop_front() else { return };
-        let (mut error, mut nearest) = (f64::INFINITY, 0);
+        let Some((actual, time)) = self.poses.pop_front() else { return };
+        let (mut error, mut nearest, mut axis) = (f64::INFINITY, 0, actual.axis);
         for (i, pair) in self.window.iter().zip(self.window.iter().skip(1)).enumerate() {
-            let distance = distance(&actual, &pair.0.tip, &pair.1.tip);
+            let [from, to] = [&pair.0.pose, &pair.1.pose];
+            let (distance, along) = distance(&actual.tip, &from.tip, &to.tip);
             if distance < error {
-                (error, nearest) = (distance, i + 1);
+                (error, nearest, axis) = (distance, i + 1, from.axis + (to.axis - from.axis) * along);
             }
         }
         if error.is_finite() {
             let TrackedSetpoint { place, tip_feed, .. } = &self.window[nearest];
-            let reached = self.last_tip.map_or(0.0, |last| (actual - last).norm() / self.period);
+            let reached = self.last_tip.map_or(0.0, |last| (actual.tip - last).norm() / self.period);
             self.feed.add(place.path_position, *tip_feed, reached, error);
+            let orientation = Kinematics::orientation_error(&axis, &actual.axis);
+            let before = if self.last_line.0 == place.line { self.last_line.1 } else { 0.0 };
+            self.last_line = (place.line, orientation.max(before));
             self.record(error, nearest, time);
         }
-        self.last_tip = Some(actual);
+        self.last_tip = Some(actual.tip);
     }
 
     fn record(&mut self, error: f64, index: usize, time: Nanoseconds) {
         let line = self.window[index].place.line;
         let known = self.worst.iter().position(|(worst, _)| worst.line == line);
+        let mut orientation = self.last_line.1;
+        if let Some((worst, _)) = known.and_then(|known| self.worst.get_mut(known)) {
+            worst.orientation = worst.orientation.max(orientation);
+            orientation = worst.orientation;
+        }
         let least = self.worst.last().map_or(0.0, |(worst, _)| worst.error);
         let is_new =
             known.map_or(self.worst.len() < COUNT || error > least, |i| error > self.worst[i].0.error);
@@ -271,7 +290,8 @@ impl LineErrors {
         if let Some(index) = known {
             self.worst.remove(index);
         }
-        let entry = WorstLine { line, text: String::new(), error, time: seconds(time), cause: Cause::Feed };
+        let (text, time, cause) = (String::new(), seconds(time), Cause::Feed);
+        let entry = WorstLine { line, text, error, orientation, time, cause };
         let place = self.worst.partition_point(|(worst, _)| worst.error >= error);
         self.worst.insert(place, (entry, Some(self.passed + index)));
         self.worst.truncate(COUNT);
@@ -295,7 +315,7 @@ impl LineErrors {
         let mut speeds = vec![0.0; self.names.len()];
         for i in range.start + 1..range.end {
             let (from, to) = (&self.window[i - 1], &self.window[i]);
-            let step = to.tip - from.tip;
+            let step = to.pose.tip - from.pose.tip;
             if step.norm() > RESOLUTION {
                 let angle = direction.map_or(0.0, |before| Kinematics::orientation_error(&before, &step));
                 (turn, sharpest) = (turn + angle, sharpest.max(angle));
@@ -327,7 +347,7 @@ impl LineErrors {
     ///
     /// Returns an error if the file cannot be read.
     pub fn finish(mut self, name: &str) -> io::Result<(Vec<WorstLine>, FeedAlongPath)> {
-        (0..self.tips.len()).for_each(|_| self.evaluate());
+        (0..self.poses.len()).for_each(|_| self.evaluate());
         self.explain(0);
         let mut worst: Vec<WorstLine> = self.worst.into_iter().map(|(worst, _)| worst).collect();
         let last = worst.iter().map(|worst| worst.line).max().unwrap_or(0);
@@ -341,10 +361,10 @@ impl LineErrors {
     }
 }
 
-/// Returns the distance of a point from the line between two points.
-fn distance(point: &Vector3<f64>, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
+/// Returns the distance of a point from the line between two points, and the place of its nearest point from 0 to 1.
+fn distance(point: &Vector3<f64>, from: &Vector3<f64>, to: &Vector3<f64>) -> (f64, f64) {
     let step = to - from;
     let squared = step.norm_squared();
     let along = if squared > 0.0 { ((point - from).dot(&step) / squared).clamp(0.0, 1.0) } else { 0.0 };
-    (point - from - step * along).norm()
+    ((point - from - step * along).norm(), along)
 }

@@ -76,6 +76,11 @@ impl<R: BufRead + Seek> Interpreter<R> {
         }
     }
 
+    /// Returns the source line that was read last, from 1.
+    pub fn line(&self) -> usize {
+        self.source.line()
+    }
+
     /// Returns the ignored M codes of the lines executed so far.
     pub fn ignored_codes(&self) -> &BTreeMap<u32, IgnoredCode> {
         &self.ignored
