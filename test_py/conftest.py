@@ -24,11 +24,14 @@ for variable in ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", "ROS_DOMAIN_ID"):
 sys.path.insert(0, str(Path(__file__).parent / "launch_standin"))
 
 from motion import go_home  # noqa: E402
-from node_process import Node, node_binary  # noqa: E402
+from node_process import Node, node_binary, use_private_shared_memory  # noqa: E402
 from virtual_axes_py.ros import AxesClient  # noqa: E402
 
 if TYPE_CHECKING:
     from action import Follow
+
+
+use_private_shared_memory()
 
 
 def pytest_sessionstart() -> None:

@@ -79,14 +79,42 @@ def node_binary() -> Path:
     """Returns the node's program: VIRTUAL_AXES_NODE, or the output of `cargo build --release`."""
     if named := os.environ.get("VIRTUAL_AXES_NODE"):
         return Path(named)
-    root = Path(__file__).resolve().parents[2]
+    root = Path(__file__).resolve().parents[1]
     return root / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / "virtual_axes_node"
+
+
+# Resolved before any fork: the child of a process with threads must not wait for the lock of the dynamic loader.
+_PRCTL = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
 
 
 def die_with_parent() -> None:
     """Makes Linux terminate the child when this process dies for any reason."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
+    if _PRCTL is not None:
+        _PRCTL(1, signal.SIGTERM)  # PR_SET_PDEATHSIG
+
+
+def separate_output() -> None:
+    """Lets `print` alone write to standard output: what Fast DDS writes there goes to standard error."""
+    sys.stdout.flush()
+    sys.stdout = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+
+
+def use_private_shared_memory() -> None:
+    """Gives this process and its children shared memory of their own, where the user may mount file systems.
+
+    Fast DDS has one queue for discovery in /dev/shm for all processes of a machine, whatever their domains. A process
+    that is killed while it holds the lock of the queue would stop all others.
+    """
+    if sys.platform != "linux" or os.geteuid() != 0:
+        return
+    new_namespace, recursive_private = 0x20000, 0x44000  # CLONE_NEWNS; MS_REC | MS_PRIVATE
+    libc = ctypes.CDLL(None)
+    if (
+        libc.unshare(new_namespace) == 0
+        and libc.mount(b"none", b"/", None, ctypes.c_ulong(recursive_private), None) == 0
+    ):
+        libc.mount(b"tmpfs", b"/dev/shm", b"tmpfs", ctypes.c_ulong(0), None)
 
 
 class Node:

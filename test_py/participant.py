@@ -38,7 +38,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from virtual_axes.msg import DriveStates, MotorCurrents
 
-from node_process import die_with_parent
+from node_process import die_with_parent, separate_output
 from virtual_axes_py.ros import DEEP_QOS, PSEC_QOS, SETTLE_S, stamp_of
 
 READY = "ready"
@@ -290,6 +290,7 @@ def probe(node: Any, services: tuple[str, str]) -> None:
 
 def main() -> None:
     """Runs the role of the command line."""
+    separate_output()
     rclpy.init()
     node = rclpy.create_node(f"participant_{os.getpid()}", enable_rosout=False, start_parameter_services=False)
     match sys.argv[1:]:

@@ -22,7 +22,7 @@ from collections import Counter
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 
-from node_process import DomainId, Node, die_with_parent
+from node_process import DomainId, Node, die_with_parent, separate_output
 
 RUSTDDS = bytes([0x01, 0x12])
 """Vendor id of the nodes, in front of their GUIDs."""
@@ -156,6 +156,7 @@ def main() -> None:
     from rclpy.qos import qos_profile_sensor_data
     from sensor_msgs.msg import JointState
 
+    separate_output()
     print("ready", flush=True)
     domain_id, nodes, delay, expected, timeout = map(float, sys.stdin.readline().split())
     os.environ["ROS_DOMAIN_ID"] = str(int(domain_id))
