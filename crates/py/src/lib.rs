@@ -1,4 +1,5 @@
-//! Native part of the Python package `virtual_axes_py`: machines, simulations, steppers and controller design.
+//! Native part of the Python package `virtual_axes_py`: machines, simulations, steppers, controller
+//! design, identification and tuning.
 //!
 //! The package `python/virtual_axes_py` wraps these classes and documents them for users. All lengths are in m, angles in
 //! rad, times in s. Functions that take long release the global interpreter lock.
@@ -8,12 +9,14 @@
 mod contour;
 mod convert;
 mod design;
+mod identification;
 mod machine;
 mod setpoints;
 mod signals;
 mod simulate;
 mod stepper;
 mod sweep;
+mod tuning;
 
 use pyo3::prelude::*;
 
@@ -24,9 +27,13 @@ mod _native {
     #[pymodule_export]
     use super::design::{PyPredictionModel, PyRst};
     #[pymodule_export]
+    use super::identification::{PyIdentification, identify};
+    #[pymodule_export]
     use super::machine::{PyMachine, machine_names};
     #[pymodule_export]
     use super::setpoints::{PartProgram, PyScenario, scenario_names};
     #[pymodule_export]
     use super::stepper::{Stepper, StepperState};
+    #[pymodule_export]
+    use super::tuning::tune;
 }

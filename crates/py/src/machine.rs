@@ -1,5 +1,6 @@
 //! PyMachine: immutable parameters.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
@@ -32,6 +33,15 @@ impl PyMachine {
         let config = parameters.machine_config().map_err(value_error)?;
         let discretized = MachineParameters::new(&config).map(Arc::new).map_err(value_error)?;
         Ok(PyMachine { parameters, config, discretized })
+    }
+
+    /// Returns the index of an axis by its name.
+    pub fn axis_index(&self, name: &str) -> PyResult<usize> {
+        let known: Vec<&str> = self.config.axes().iter().map(|axis| axis.name()).collect();
+        known
+            .iter()
+            .position(|known| *known == name)
+            .ok_or_else(|| value_error(format!("axis {name:?} is unknown; known are {}", known.join(", "))))
     }
 
     /// Returns a copy with other parameters.
@@ -109,6 +119,22 @@ impl PyMachine {
         figures: &str,
     ) -> PyResult<(Bound<'py, PyDict>, String, usize)> {
         simulate::simulate(py, self, &psec, &signals, every_tick, figures)
+    }
+
+    /// Writes a trace of the motion, a row per position cycle.
+    fn write_trace<'py>(&self, py: Python<'py>, psec: Given<'py>, path: PathBuf) -> PyResult<()> {
+        simulate::write_trace(py, self, &psec, &path)
+    }
+
+    /// Returns the page of the motion as HTML.
+    fn report<'py>(
+        &self,
+        py: Python<'py>,
+        psec: Given<'py>,
+        title: &str,
+        description: &str,
+    ) -> PyResult<String> {
+        simulate::report(py, self, &psec, (title, description))
     }
 
     #[pyo3(signature = (variants, psec, figures, threads))]

@@ -1,6 +1,7 @@
 //! Complete runs: setpoints in, signals and figures out.
 
 use std::io;
+use std::path::Path;
 use std::sync::Arc;
 
 use numpy::PyReadonlyArray2;
@@ -11,7 +12,8 @@ use virtual_axes_core::path::Program;
 use virtual_axes_core::trial::{
     self, GridRows, Measures, SetpointSource, Tick, Trial, TrialError, TrialOutcome,
 };
-use virtual_axes_io::files::figures_json;
+use virtual_axes_io::files::{figures_json, trace_writer};
+use virtual_axes_report::runs::{SimulatedRun, SimulationPage, controller_name};
 
 use crate::convert::{check_signals, value_error};
 use crate::machine::PyMachine;
@@ -113,6 +115,23 @@ impl SignalCheck {
     }
 }
 
+impl Prepared {
+    fn trial<'m>(&self, machine: &'m PyMachine, measures: Measures, record: bool) -> Trial<'m> {
+        let node = machine.parameters.node_config();
+        Trial {
+            machine: &machine.config,
+            program: self.program.clone(),
+            allow_nonzero_end_velocity: node.allow_nonzero_velocity_at_trajectory_end,
+            record,
+            measures,
+        }
+    }
+
+    fn source(&self) -> SetpointSource<'_> {
+        SetpointSource::Grid(Box::new(GridRows::new(&self.rows.joints, &self.rows.values)))
+    }
+}
+
 fn run(
     machine: &PyMachine,
     prepared: &Prepared,
@@ -120,15 +139,7 @@ fn run(
     every_tick: bool,
     table: &mut SignalTable,
 ) -> PyResult<TrialOutcome> {
-    let trial = Trial {
-        machine: &machine.config,
-        program: prepared.program.clone(),
-        allow_nonzero_end_velocity: machine.parameters.node_config().allow_nonzero_velocity_at_trajectory_end,
-        record: false,
-        measures,
-    };
-    let rows = &prepared.rows;
-    let source = SetpointSource::Grid(Box::new(GridRows::new(&rows.joints, &rows.values)));
+    let (trial, source) = (prepared.trial(machine, measures, false), prepared.source());
     let mut signals = SignalCheck::new();
     let callback = |tick: Tick<'_>| {
         table.push(tick.time, tick.machine);
@@ -161,4 +172,63 @@ pub fn simulate<'py>(
     let json = serde_json::Value::Object(figures_json(&outcome.figures)).to_string();
     let setpoints = prepared.rows.values.len() / prepared.rows.joints.len().max(1);
     Ok((table.into_dict(py, machine.config.axes().len())?, json, setpoints))
+}
+
+/// Simulates setpoints again and writes the trace of `virtual_axes run --trace`, a row per position cycle.
+pub fn write_trace(py: Python<'_>, machine: &PyMachine, psec: &Given<'_>, path: &Path) -> PyResult<()> {
+    let prepared = psec.prepare(py, machine)?;
+    let names: Vec<String> = machine.config.axes().iter().map(|axis| axis.name().to_owned()).collect();
+    py.detach(|| {
+        let mut writer = trace_writer(path, &names)?;
+        let (mut signals, mut samples) = (SignalCheck::new(), Vec::new());
+        let callback = |tick: Tick<'_>| {
+            signals.cycle()?;
+            samples.clear();
+            samples.extend(tick.machine.axes().iter().map(|axis| *axis.sample()));
+            writer.row(tick.time, &samples)
+        };
+        let trial = prepared.trial(machine, Measures::AXES, false);
+        trial::run(&trial, prepared.source(), callback).map_err(|error| signals.error(error))?;
+        Ok(writer.finish()?)
+    })
+}
+
+/// Simulates setpoints again and returns the page of `virtual_axes run --report` as HTML. `title` and `description` are
+/// those of the setpoints.
+pub fn report(
+    py: Python<'_>,
+    machine: &PyMachine,
+    psec: &Given<'_>,
+    (title, description): (&str, &str),
+) -> PyResult<String> {
+    let prepared = psec.prepare(py, machine)?;
+    py.detach(|| {
+        let mut signals = SignalCheck::new();
+        let trial = prepared.trial(machine, Measures::ALL, true);
+        let outcome = trial::run(&trial, prepared.source(), |_| signals.cycle())
+            .map_err(|error| signals.error(error))?;
+        let run = SimulatedRun::<()> {
+            controller: controller_name(&machine.parameters),
+            changes: Vec::new(),
+            shared_changes: 0,
+            machine: machine.config.clone(),
+            input_warnings: Vec::new(),
+            input_notes: Vec::new(),
+            part_program: None,
+            outcome,
+        };
+        let program = format!("virtual_axes_py {}", env!("CARGO_PKG_VERSION"));
+        let page = SimulationPage {
+            title,
+            description,
+            machine: machine.config.name(),
+            runs: std::slice::from_ref(&run),
+            sections: Vec::new(),
+            scatters: &[],
+            provenance: vec![("program".to_owned(), program)],
+        };
+        let mut text = Vec::new();
+        page.write(&mut text)?;
+        String::from_utf8(text).map_err(value_error)
+    })
 }

@@ -1,6 +1,6 @@
 //! HTML report pages with tables and plots of simulated runs and of identifications.
 //!
-//! [`Report`] compares one or several runs, [`IdentificationPage`] documents the identification of an axis,
+//! [`Report`] compares one or several runs ([`runs::SimulationPage`] fills it), [`IdentificationPage`] documents the identification of an axis,
 //! and [`Document`] is a page of any text, tables and [`Chart`]s. A page is one self-contained file: it
 //! includes its style sheet and its plots (SVG), has no script, and loads nothing. Colors follow the light,
 //! dark or print theme; lines differ by dash pattern as well. Equal input gives equal bytes. Signals are
@@ -41,6 +41,7 @@ mod plot_area;
 mod polar;
 mod report;
 mod report_page;
+pub mod runs;
 mod scale;
 mod scatter;
 mod shade;

@@ -19,7 +19,8 @@ use crate::part_program_arguments::PartProgramArguments;
 use crate::progress::TrialProgress;
 use crate::row_audit::RowAudit;
 use crate::setpoint_summary::SetpointSummary;
-use crate::{axis_warnings, interrupt, limit_audit_output, part_program, print_error, program_text};
+use crate::{interrupt, limit_audit_output, part_program, print_error, program_text};
+use virtual_axes_report::runs::axis_warnings;
 
 /// Arguments of `virtual_axes check`.
 #[derive(Debug, clap::Args)]

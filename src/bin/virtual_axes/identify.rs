@@ -1,15 +1,14 @@
 //! `virtual_axes identify`: identification of the parameters of an axis from recordings.
 
-use std::cmp::Reverse;
 use std::error::Error;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use virtual_axes_core::config::{DEFAULT_MACHINE, MachineConfig, ParameterKind, Parameters, Periods};
-use virtual_axes_core::units::MILLISECOND_NS;
+use virtual_axes_core::config::{DEFAULT_MACHINE, MachineConfig, Parameters, Periods};
 use virtual_axes_identify::identify::summary::IdentificationSummary;
 use virtual_axes_identify::identify::{
-    Agreement, Breakaway, IdentificationInput, IdentificationOptions, IdentifiedValue, RefinementScope,
+    AxisIdentification, AxisValidation, Breakaway, ConditionedRecording, IdentificationInput,
+    IdentificationOptions, IdentifiedValue, RefinementScope,
 };
 use virtual_axes_identify::recording::{Finding, Severity};
 use virtual_axes_io::files::OutputFile;
@@ -17,11 +16,11 @@ use virtual_axes_report::{IdentificationPage, ValidationRecording};
 
 use crate::campaign::FeedforwardName;
 use crate::identify_columns as columns;
-use crate::identify_result::{AxisValidation, IdentificationResult, InvalidResult};
+use crate::identify_result::InvalidResult;
 use crate::input::must_not_replace;
 use crate::output_arguments::{OutputArguments, OutputFormat};
 use crate::progress::Spinner;
-use crate::recordings::{self, ConditionedRecording, RecordingArguments};
+use crate::recordings::{self, RecordingArguments};
 use crate::{axis, identify_text, machine_file, report, variant};
 
 /// Group of parameters that the refinement adjusts.
@@ -118,7 +117,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     let (mut texts, mut summaries, mut present) = (Vec::new(), Vec::new(), parameters);
     for index in indices {
         let config = present.machine_config()?;
-        let (found, identified) = match identify(arguments, &present, &config, index, &spinner) {
+        let found = match identify(arguments, &present, &config, index, &spinner) {
             Err(error) if is_all => {
                 failures.push(format!("{}: {error}", config.axes()[index].name()));
                 continue;
@@ -131,7 +130,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
         }
         texts.push(output(arguments, &found.summary));
         summaries.push(found.summary);
-        present = identified;
+        present = found.identified;
     }
     if let Some(reason) = InvalidResult::reason(&summaries, &failures) {
         drop(spinner);
@@ -197,7 +196,7 @@ fn check_outputs(arguments: &IdentifyArguments) -> Result<(), String> {
 }
 
 /// Writes the page. The file is replaced atomically.
-fn write_report(path: &Path, found: &IdentificationResult, periods: Periods) -> io::Result<()> {
+fn write_report(path: &Path, found: &AxisIdentification, periods: Periods) -> io::Result<()> {
     let inputs: Vec<IdentificationInput<'_>> =
         found.recordings.iter().map(ConditionedRecording::input).collect();
     let findings: Vec<Vec<Finding>> = found.recordings.iter().map(|r| r.findings.clone()).collect();
@@ -219,14 +218,14 @@ fn write_report(path: &Path, found: &IdentificationResult, periods: Periods) -> 
     file.finish()
 }
 
-/// Identifies the axis; returns the result and the parameters of the machine with it.
+/// Reads the recordings and identifies the axis.
 fn identify(
     arguments: &IdentifyArguments,
     parameters: &Parameters,
     config: &MachineConfig,
     index: usize,
     spinner: &Spinner,
-) -> Result<(IdentificationResult, Parameters), Box<dyn Error>> {
+) -> Result<AxisIdentification, Box<dyn Error>> {
     let (axis, periods) = (&config.axes()[index], config.periods());
     let (files, others) = (&arguments.recordings, &arguments.validate);
     let modes = recordings::feedforward(&arguments.feedforward, files.len(), "--feedforward")?;
@@ -247,82 +246,10 @@ fn identify(
         others.iter().zip(other_modes).map(|(path, mode)| read(path, mode, "--validate-feedforward"));
     let others: Vec<ConditionedRecording> = others.collect::<Result<_, _>>()?;
 
-    spinner.set_activity(format!("identifying {}", axis.name()))?;
-    let inputs: Vec<IdentificationInput<'_>> = recordings.iter().map(ConditionedRecording::input).collect();
     let i0 = if arguments.free_i0 { Breakaway::Freed } else { Breakaway::Held };
     let options = IdentificationOptions { i0, refine: refined_groups(arguments) };
-    let identification = virtual_axes_identify::identify::identify(&inputs, axis, &periods, &options);
-    let of_files = recordings.iter().chain(&others).flat_map(|recorded| &recorded.findings);
-    // The same file can be given twice.
-    let mut findings: Vec<Finding> = Vec::new();
-    for finding in of_files.chain(&identification.findings) {
-        if !findings.contains(finding) {
-            findings.push(finding.clone());
-        }
-    }
-    findings.sort_by_key(|finding| Reverse(finding.severity));
-    let values = identification.values(parameters, axis.name());
-    if !values.iter().any(|value| is_determined(value, parameters, &periods)) {
-        return Err(no_result_message(axis.name(), &findings).into());
-    }
-    let mut identified = parameters.clone();
-    let updated = virtual_axes_identify::identify::update_parameters(&mut identified, axis.name(), &values);
-    if let Err(error) = updated.and_then(|()| identified.machine_config().map(drop)) {
-        // The values are shown, with the reason why they cannot be used.
-        findings.insert(
-            0,
-            Finding::invalid("rejected", error.to_string(), "check the recordings and the machine file"),
-        );
-        identified = parameters.clone();
-    }
-    // Values rounded to the digits of the machine file.
-    let updated = identified.machine_config()?;
-
-    spinner.set_activity(format!("validating {}", axis.name()))?;
-    let validations = others.into_iter().map(|mut recorded| {
-        recorded.feedforward = recorded.feedforward.or(identification.inferred_feedforward);
-        let agreement = virtual_axes_identify::identify::validate(
-            &recorded.input(),
-            &updated.axes()[index],
-            &updated.periods(),
-        )?;
-        Ok(AxisValidation { recorded, agreement })
-    });
-    let validations: Vec<AxisValidation> = validations.collect::<Result<_, Box<dyn Error>>>()?;
-    for AxisValidation { recorded, agreement } in &validations {
-        let kind = axis.kind();
-        findings.extend(virtual_axes_identify::identify::invalid_agreement(
-            &recorded.signals.name,
-            agreement,
-            kind,
-        ));
-    }
-    findings.sort_by_key(|finding| Reverse(finding.severity));
-    let validated: Vec<(IdentificationInput<'_>, &Agreement)> =
-        validations.iter().map(|v| (v.recorded.input(), &v.agreement)).collect();
-    let summary =
-        IdentificationSummary::new(config.name(), &inputs, &identification, values, &validated, findings);
-    Ok((IdentificationResult { recordings, identification, validations, summary }, identified))
-}
-
-/// Returns true if the recordings determine a value: false for a delay whose interval is its whole range.
-fn is_determined(value: &IdentifiedValue, parameters: &Parameters, periods: &Periods) -> bool {
-    let Some([low, high]) = value.interval else { return true };
-    // Delays are tried in steps of a position cycle, which may not reach the longest one.
-    let step = periods.position as f64 / MILLISECOND_NS as f64;
-    match parameters.definition(&value.key).map(|definition| definition.kind) {
-        Some(ParameterKind::Number { min, max }) => low > min || high + step <= max,
-        _ => true,
-    }
-}
-
-/// Returns the error message if no parameter could be identified.
-fn no_result_message(axis: &str, findings: &[Finding]) -> String {
-    let mut text = format!("no parameter of {axis} could be identified");
-    for finding in findings {
-        text.push_str(&format!("\n{}", identify_text::finding(finding)));
-    }
-    text
+    let start = |part: &str| spinner.set_activity(part);
+    Ok(AxisIdentification::new((parameters, index), recordings, others, &options, start)?)
 }
 
 /// Returns the machine file.
@@ -348,7 +275,7 @@ fn machine_text(
             head.push_str(&format!("\nValidated on {}.", others.join(", ")));
         }
         for finding in summary.findings.iter().filter(|finding| finding.severity > Severity::Note) {
-            head.push_str(&format!("\n{}", identify_text::finding(finding)));
+            head.push_str(&format!("\n{}", finding.line()));
         }
     }
     let comment = |key: &str| {

@@ -10,24 +10,14 @@ use virtual_axes_identify::identify::summary::{
 use virtual_axes_identify::identify::{
     FeedforwardRegression, FrictionLaw, GravityCurrent, GravitySource, IdentifiedValue, ResidualStatistics,
 };
-use virtual_axes_identify::recording::{Finding, Severity};
+use virtual_axes_identify::recording::Severity;
+use virtual_axes_report::runs::table;
 use virtual_axes_report::{Table, TableColumn};
 
-use crate::{table, text_table};
+use crate::text_table;
 
 /// Cell without a value.
 const NONE: &str = "–";
-
-/// Formats a finding with its remedy on one line.
-pub fn finding(finding: &Finding) -> String {
-    let severity = match finding.severity {
-        Severity::Invalid => "invalid",
-        Severity::Missing => "missing",
-        Severity::Warning => "warning",
-        Severity::Note => "note",
-    };
-    format!("{severity}: {finding}")
-}
 
 fn table_of(columns: &[(&str, &str)]) -> Table {
     let columns = columns.iter().map(|&(name, unit)| TableColumn::new(name, unit)).collect();
@@ -63,8 +53,7 @@ pub fn text(found: &IdentificationSummary) -> String {
     parts.extend(steps(found));
     parts.push(text_table::text(&agreement(found)));
     parts.push(baselines(found));
-    let findings: Vec<String> =
-        found.findings.iter().map(|f| text_table::wrapped_line(&finding(f))).collect();
+    let findings: Vec<String> = found.findings.iter().map(|f| text_table::wrapped_line(&f.line())).collect();
     parts.push(findings.concat());
     parts.retain(|part| !part.is_empty());
     parts.join("\n")

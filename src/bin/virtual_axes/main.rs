@@ -5,13 +5,11 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
 
 mod axis;
-mod axis_warnings;
 mod campaign;
 mod check;
 mod design;
 mod design_output;
 mod feed_along_path;
-mod figure;
 mod identify;
 mod identify_columns;
 mod identify_result;
@@ -41,15 +39,12 @@ mod row_audit;
 mod run;
 mod search;
 mod setpoint_summary;
-mod table;
 mod text_table;
 mod trial_arguments;
 mod tune;
 mod tune_output;
-mod tune_result;
 mod urdf;
 mod variant;
-mod verdict;
 mod worst_lines;
 
 use std::error::Error;

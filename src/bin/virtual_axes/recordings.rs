@@ -5,16 +5,11 @@ use std::path::{Path, PathBuf};
 
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::units::MILLISECOND;
-use virtual_axes_identify::identify::{
-    FeedforwardMode, IdentificationInput, are_production_traces, constant_lag,
-};
-use virtual_axes_identify::recording::{Conditioning, Finding, PsecShift, Signals, condition};
+use virtual_axes_identify::identify::{ConditionedRecording, FeedforwardMode};
+use virtual_axes_identify::recording::{Conditioning, PsecShift};
 use virtual_axes_io::files::{Columns, RecordingFormat, RecordingOptions, read_recording};
 
 use crate::campaign::FeedforwardName;
-
-/// Lag of the position, relative to 1 / Kp, below which velocity feedforward must be active.
-const SHORT: f64 = 0.7;
 
 /// Options for reading all recordings.
 #[derive(Debug, clap::Args)]
@@ -95,24 +90,6 @@ impl RecordingArguments {
     }
 }
 
-/// Recording after conditioning, with its active feedforward and findings.
-#[derive(Debug)]
-pub struct ConditionedRecording {
-    /// Conditioned signals.
-    pub signals: Signals,
-    /// Active feedforward according to the options.
-    pub feedforward: Option<FeedforwardMode>,
-    /// Findings of reading and conditioning.
-    pub findings: Vec<Finding>,
-}
-
-impl ConditionedRecording {
-    /// Converts the recording to the input of the identification.
-    pub fn input(&self) -> IdentificationInput<'_> {
-        IdentificationInput { signals: &self.signals, feedforward: self.feedforward }
-    }
-}
-
 /// Reads and conditions the recording `path` of `axis`; `feedforward` is the value of `option`.
 ///
 /// # Errors
@@ -124,51 +101,9 @@ pub fn read(
     (reading, options): (&RecordingArguments, &RecordingOptions),
     (feedforward, option): (Option<FeedforwardMode>, &str),
 ) -> Result<ConditionedRecording, Box<dyn Error>> {
-    let (raw, mut findings) = read_recording(path, axis, options)?;
-    let (signals, more) = condition(&raw, axis, periods, &reading.conditioning())?;
-    findings.extend(more);
-    let input = IdentificationInput { signals: &signals, feedforward };
-    let is_inferred = are_production_traces(&[input], axis, periods);
-    let mut feedforward = feedforward;
-    if let (None, Some(missing), false) = (feedforward, missing_feedforward(&signals), is_inferred) {
-        let lag = constant_lag(&signals).map(|(lag, _)| lag);
-        let without = 1.0 / axis.position_loop.gain;
-        if !lag.is_some_and(|lag| lag < SHORT * without) {
-            return Err(format!(
-                "{}: has no {missing}, and the lag of the position ({:.1} ms) does not tell whether feedforward was active: \
-                 without it the lag is at least 1 / Kp, {:.1} ms; give {option} off, velocity or both",
-                signals.name,
-                lag.unwrap_or(f64::NAN) / MILLISECOND,
-                without / MILLISECOND
-            )
-            .into());
-        }
-        let mode =
-            if axis.feedforward.torque != 0.0 { FeedforwardMode::Both } else { FeedforwardMode::Velocity };
-        feedforward = Some(mode);
-        let what = format!(
-            "{}: feedforward {} is assumed: the position lags by {:.1} ms, without feedforward it would by at least 1 / Kp, \
-             {:.1} ms",
-            signals.name,
-            mode.name(),
-            lag.unwrap_or(f64::NAN) / MILLISECOND,
-            without / MILLISECOND
-        );
-        findings.push(Finding::note("feedforward-inferred", what));
-    }
-    Ok(ConditionedRecording { signals, feedforward, findings })
-}
-
-/// Returns the name of the feedforward signal that is missing to determine the active feedforward.
-fn missing_feedforward(signals: &Signals) -> Option<&'static str> {
-    let is_active = |channel: &[f64]| channel.iter().any(|value| *value != 0.0);
-    signals.spans.iter().filter(|span| span.psec.is_some()).find_map(|span| {
-        match (&span.velocity_feedforward, &span.torque_feedforward) {
-            (None, _) => Some("velocity feedforward (VFFWS)"),
-            (Some(velocity), None) if is_active(velocity) => Some("torque feedforward (TFFWS)"),
-            _ => None,
-        }
-    })
+    let (raw, findings) = read_recording(path, axis, options)?;
+    let conditioning = reading.conditioning();
+    Ok(ConditionedRecording::new((&raw, findings), (axis, periods), &conditioning, (feedforward, option))?)
 }
 
 /// Returns the active feedforward of each of `count` recordings from the values of `option`: one for all, or

@@ -6,11 +6,12 @@ use serde_json::{Value, json};
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::text::escaped;
 use virtual_axes_identify::tune::{Cost, DeviatingRun, PlantDeviation, Robustness, analyze_robustness};
+use virtual_axes_io::files::costed_run_json;
 use virtual_axes_report::Table;
 
 use crate::output_arguments::{OutputArguments, OutputFormat};
 use crate::progress::SearchProgress;
-use crate::search::{columns, name_error, object, read_workload, row};
+use crate::search::{columns, name_error, read_workload, row};
 use crate::text_table;
 use crate::trial_arguments::TrialArguments;
 use crate::variant::{self, ControllerName};
@@ -120,5 +121,6 @@ fn json_of(one: &DeviatingRun, config: &MachineConfig) -> Value {
         "friction": one.deviation.friction,
         "torque_constant": one.deviation.torque_constant,
     });
-    object(vec![("deviation", deviation)], one.cost, one.margins.as_ref(), &one.figures, config).into()
+    let description = vec![("deviation", deviation)];
+    costed_run_json(description, one.cost, one.margins.as_ref(), &one.figures, config).into()
 }

@@ -8,9 +8,11 @@ use std::sync::Arc;
 use virtual_axes_core::config::{MachineConfig, Parameters};
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_core::path::Program;
+use virtual_axes_core::text::escaped;
 use virtual_axes_core::trial::{Measures, Tick, Trial, TrialOutcome};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_io::files::{TraceWriter, trace_writer};
+use virtual_axes_report::runs::{figure, table, verdict};
 
 use crate::input::CommandInput;
 use crate::output_arguments::{OutputArguments, OutputFormat};
@@ -20,7 +22,7 @@ use crate::setpoint_summary::SetpointSummary;
 use crate::trial_arguments::TrialArguments;
 use crate::variant::{self, ControllerName, VariantRun};
 use crate::worst_lines::{LineErrors, ProgramFigures};
-use crate::{figure, interrupt, json, program_text, report, table, text_table, verdict};
+use crate::{interrupt, json, program_text, report, text_table};
 
 /// Arguments of `virtual_axes run`.
 #[derive(Debug, clap::Args)]
@@ -107,7 +109,7 @@ pub fn run(arguments: &RunArguments) -> Result<String, Box<dyn Error>> {
     Ok(match arguments.output.format() {
         OutputFormat::Json => format!("{:#}\n", json::object(&input, &name, &runs)),
         OutputFormat::Csv => csv(&runs),
-        OutputFormat::Quiet => verdict::text(&runs),
+        OutputFormat::Quiet => verdict::lines(&runs).into_iter().map(|line| escaped(&line) + "\n").collect(),
         OutputFormat::Text => text(&runs),
     })
 }
@@ -219,7 +221,8 @@ impl TraceRecorder {
 
 /// Returns the verdict and the tables of the runs: a row per axis of a single run, a column per run of several.
 fn text(runs: &[VariantRun]) -> String {
-    let mut parts = vec![verdict::wrapped(runs)];
+    let verdict = verdict::lines(runs).into_iter().map(|line| text_table::wrapped_line(&escaped(&line)));
+    let mut parts = vec![verdict.collect::<String>()];
     match runs {
         [run] => parts.extend(single(run)),
         _ => parts.extend(several(runs)),

@@ -1,14 +1,12 @@
-//! Common parts of `tune` and `robustness`: repeated simulation of paths, and figures as table cells and
-//! JSON.
+//! Common parts of `tune` and `robustness`: repeated simulation of paths, and figures as table cells.
 
 use std::error::Error;
 
-use serde_json::{Map, Value, json};
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::design::Margins;
 use virtual_axes_core::trial::Figures;
 use virtual_axes_core::units::{DEGREE, MILLISECOND};
-use virtual_axes_identify::tune::{Cost, CostTerm, TuneError, Tuning, TuningCandidate, Workload};
+use virtual_axes_identify::tune::{Cost, CostTerm, TuneError, Workload};
 use virtual_axes_report::TableColumn;
 
 use crate::input::CommandInput;
@@ -84,58 +82,4 @@ pub fn row(
 /// Returns the longest saturation time of an axis, s.
 fn saturation(figures: &Figures) -> f64 {
     figures.axes.iter().map(|axis| axis.report.saturation_time).fold(0.0, f64::max)
-}
-
-/// Returns a run as JSON: `description`, cost, margins, and all terms of cost functions.
-pub fn object(
-    description: Vec<(&str, Value)>,
-    cost: f64,
-    margins: Option<&Margins>,
-    figures: &Figures,
-    machine: &MachineConfig,
-) -> Map<String, Value> {
-    let mut object: Map<String, Value> =
-        description.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
-    object.insert("cost".to_owned(), json!(cost));
-    let margins = margins.map_or(Value::Null, |m| {
-        json!({
-            // Infinite margins are null in JSON.
-            "modulus": m.modulus,
-            "phase_deg": m.phase / DEGREE,
-            "gain": m.gain,
-            "delay_ms": m.delay / MILLISECOND,
-        })
-    });
-    object.insert("margins".to_owned(), margins);
-    let terms = CostTerm::ALL.map(|term| (term.name().replace('-', "_"), json!(term.of(figures, machine))));
-    object.insert("terms".to_owned(), Value::Object(terms.into_iter().collect()));
-    object.insert("saturation_s".to_owned(), json!(saturation(figures)));
-    object
-}
-
-/// Returns a simulated tuning as JSON.
-pub fn candidate(candidate: &TuningCandidate, machine: &MachineConfig) -> Map<String, Value> {
-    let description = vec![("tuning", tuning(&candidate.tuning))];
-    object(description, candidate.cost, candidate.margins.as_ref(), &candidate.figures, machine)
-}
-
-fn tuning(tuning: &Tuning) -> Value {
-    match tuning {
-        Tuning::Present => json!("present"),
-        Tuning::Gpc { n1, n2, nu, lambda_rel } => {
-            json!({ "n1": n1, "n2": n2, "nu": nu, "lambda_rel": lambda_rel })
-        }
-        Tuning::Cascade(axes) => axes
-            .iter()
-            .map(|(joint, gains)| {
-                let gains = json!({
-                    "gain": gains.gain,
-                    "velocity_feedforward": gains.velocity,
-                    "torque_feedforward": gains.torque,
-                });
-                (joint.clone(), gains)
-            })
-            .collect::<Map<_, _>>()
-            .into(),
-    }
 }

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::tune::{
-    Cost, MarginLimits, TuneError, Tuning, TuningProblem, Workload, find_contrasts, fine_design_grid,
-    tune_cascade, tune_gpc, tune_gpc_from,
+    Cost, MarginLimits, TuneError, Tuning, TuningProblem, TuningResult, TuningSearch, Workload,
 };
+use virtual_axes_io::files::tuning_json;
 
 use crate::input::{CommandInput, must_not_replace};
 use crate::output_arguments::{OutputArguments, OutputFormat};
@@ -16,12 +16,20 @@ use crate::progress::SearchProgress;
 use crate::report::ReportMachine;
 use crate::search::{name_error, read_workload};
 use crate::trial_arguments::TrialArguments;
-use crate::tune_result::{ComparedPath, TunableController, TuningResult};
 use crate::variant::VariantRun;
 use crate::{machine_file, program_text, report, tune_output as output, variant};
 
 /// Maximum of `--designs`, about an hour of computation.
 const MOST_DESIGNS: u64 = 1_000_000;
+
+/// Controller that can be tuned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum TunableController {
+    /// N1, N2, Nu and λ of the predictive controller.
+    Gpc,
+    /// Kp and feedforward weights of the cascade.
+    Cascade,
+}
 
 /// Arguments of `virtual_axes tune`.
 #[derive(Debug, clap::Args)]
@@ -115,10 +123,11 @@ pub fn run(arguments: &TuneArguments) -> Result<String, Box<dyn Error>> {
     let paths =
         others.iter().map(|other| read_workload(other, &config, None)).collect::<Result<Vec<_>, _>>()?;
     let limits = limits(arguments);
+    let search = search(arguments, tunable);
 
     let progress = SearchProgress::new(arguments.output.is_quiet());
     let found = TuningProblem::new(&parameters, &path, &arguments.cost, &progress)
-        .and_then(|problem| Ok((search(arguments, tunable, &problem, &paths, &limits)?, problem)));
+        .and_then(|problem| Ok((TuningResult::find(&problem, search, &paths, &limits)?, problem)));
     progress.finish();
     let (found, problem) = found.map_err(|error| name_error(&input, error))?;
     let Some(found) = found else {
@@ -147,7 +156,9 @@ pub fn run(arguments: &TuneArguments) -> Result<String, Box<dyn Error>> {
     }
     Ok(match arguments.output.format() {
         OutputFormat::Json => {
-            format!("{:#}\n", output::object(&input, tunable, &limits, arguments.seed(), &problem, &found))
+            let input = (input.name(), input.description());
+            let object = tuning_json(input, search, &limits, arguments.seed(), &problem, &found);
+            format!("{:#}\n", serde_json::Value::Object(object))
         }
         OutputFormat::Csv => output::csv(&problem, &found),
         OutputFormat::Quiet => output::verdict(&problem, &found, warning.as_deref()),
@@ -163,6 +174,17 @@ fn tunable_controller(parameters: &Parameters) -> Result<TunableController, Stri
         other => Err(format!(
             "--controller: must be gpc or cascade; the machine has {other}, which cannot be tuned"
         )),
+    }
+}
+
+/// Returns the search of the options.
+fn search(arguments: &TuneArguments, tunable: TunableController) -> TuningSearch {
+    match tunable {
+        _ if arguments.contrast => TuningSearch::Contrast,
+        TunableController::Gpc => {
+            TuningSearch::Gpc(arguments.designs.and_then(|designs| usize::try_from(designs).ok()))
+        }
+        TunableController::Cascade => TuningSearch::Cascade(arguments.seed()),
     }
 }
 
@@ -193,46 +215,6 @@ fn check_outputs(arguments: &TuneArguments, input: &CommandInput) -> Result<(), 
         Some(page) => Ok(report::check_name(page)?),
         None => Ok(()),
     }
-}
-
-/// Runs the search; returns `None` if no contrast exists.
-fn search(
-    arguments: &TuneArguments,
-    tunable: TunableController,
-    problem: &TuningProblem<'_>,
-    paths: &[Workload],
-    limits: &MarginLimits,
-) -> Result<Option<TuningResult>, TuneError> {
-    if let (true, [path]) = (arguments.contrast, paths) {
-        let (present, contrasts) = find_contrasts(problem, path, limits)?;
-        return Ok(contrasts.first().cloned().map(|worst| TuningResult {
-            best: worst.better,
-            search: None,
-            elsewhere: vec![ComparedPath { name: path.name().to_owned(), present, tuned: worst.worse }],
-            contrasts,
-        }));
-    }
-    let search = match tunable {
-        TunableController::Gpc => match arguments.designs.and_then(|designs| usize::try_from(designs).ok()) {
-            Some(designs) => tune_gpc_from(problem, limits, fine_design_grid(designs))?,
-            None => tune_gpc(problem, limits)?,
-        },
-        TunableController::Cascade => tune_cascade(problem, limits, arguments.seed())?,
-    };
-    let elsewhere = paths.iter().map(|path| {
-        Ok(ComparedPath {
-            name: path.name().to_owned(),
-            present: problem.run_on(path, &Tuning::Present)?,
-            tuned: problem.run_on(path, &search.best.tuning)?,
-        })
-    });
-    let elsewhere = elsewhere.collect::<Result<Vec<_>, TuneError>>()?;
-    Ok(Some(TuningResult {
-        best: search.best.clone(),
-        search: Some(search),
-        contrasts: Vec::new(),
-        elsewhere,
-    }))
 }
 
 /// Writes the machine file with the best tuning atomically.

@@ -1,18 +1,14 @@
-//! Output of `virtual_axes tune`: text, JSON, and scatter plots of the report.
+//! Output of `virtual_axes tune`: text, and scatter plots of the report.
 
-use serde_json::{Map, Value, json};
 use virtual_axes_core::text::escaped;
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::tune::{
-    CostTerm, MarginLimits, Tuning, TuningCandidate, TuningProblem, pareto_front,
+    CostTerm, Tuning, TuningCandidate, TuningProblem, TuningResult, pareto_front,
 };
-use virtual_axes_io::files::figures_json;
 use virtual_axes_report::{PointGroup, PointStyle, Scatter, Table, TableColumn};
 
-use crate::input::CommandInput;
-use crate::search::{candidate, columns, row};
+use crate::search::{columns, row};
 use crate::text_table;
-use crate::tune_result::{TunableController, TuningResult};
 
 /// Maximum number of rows of a table of tunings; the JSON output contains all.
 const ROWS: usize = 6;
@@ -21,11 +17,6 @@ const MAX_PLOTTED_COST: f64 = 2.0;
 
 fn modulus(candidate: &TuningCandidate) -> f64 {
     candidate.margins.map_or(f64::NAN, |margins| margins.modulus)
-}
-
-/// Returns the Pareto front of cost and modulus margin.
-fn pareto(found: &TuningResult) -> Vec<&TuningCandidate> {
-    found.search.as_ref().map_or_else(Vec::new, |search| pareto_front(&search.tried, modulus))
 }
 
 fn candidate_row(name: String, candidate: &TuningCandidate, problem: &TuningProblem<'_>) -> Vec<String> {
@@ -67,7 +58,7 @@ fn tunings(problem: &TuningProblem<'_>, found: &TuningResult) -> Table {
 /// Returns initial and best tuning and all tunings of the Pareto front as comma-separated values.
 pub fn csv(problem: &TuningProblem<'_>, found: &TuningResult) -> String {
     let mut table = tunings(problem, found);
-    let front = pareto(found).into_iter();
+    let front = found.pareto().into_iter();
     table.rows.extend(front.map(|one| candidate_row(one.tuning.to_string(), one, problem)));
     text_table::csv(&table)
 }
@@ -89,7 +80,7 @@ pub fn text(problem: &TuningProblem<'_>, found: &TuningResult, warning: Option<&
         text.push_str("\nno tuning within these margins is better than the initial tuning\n");
     }
     if let Some(search) = &found.search {
-        let front = pareto(found);
+        let front = found.pareto();
         let mut rows = Table { columns: columns("cost against modulus margin"), ..Table::default() };
         for one in table_rows(&front) {
             rows.rows.push(candidate_row(one.tuning.to_string(), one, problem));
@@ -171,51 +162,6 @@ fn elsewhere(problem: &TuningProblem<'_>, found: &TuningResult) -> Table {
         rows: std::iter::once(first).chain(others).collect(),
         ..Table::default()
     }
-}
-
-/// Returns the result as a JSON object.
-pub fn object(
-    input: &CommandInput,
-    tunable: TunableController,
-    limits: &MarginLimits,
-    seed: u64,
-    problem: &TuningProblem<'_>,
-    found: &TuningResult,
-) -> Value {
-    let with_figures = |one: &TuningCandidate| {
-        let mut object = candidate(one, problem.config());
-        object.insert("figures".to_owned(), figures_json(&one.figures).into());
-        Value::Object(object)
-    };
-    let plain = |one: &TuningCandidate| Value::Object(candidate(one, problem.config()));
-    let mut object = Map::new();
-    let mut add = |name: &str, value: Value| object.insert(name.to_owned(), value);
-    add("input", json!(input.name()));
-    add("description", json!(input.description()));
-    add("machine", json!(problem.config().name()));
-    add("controller", json!(if tunable == TunableController::Gpc { "gpc" } else { "cascade" }));
-    add("tuned_axes", json!(problem.joints()));
-    let terms = problem.cost().terms().iter().map(|(term, weight)| (term.name().to_owned(), json!(weight)));
-    add("cost", Value::Object(terms.collect()));
-    add("cost_unit", json!(problem.cost().unit(&problem.present().figures)));
-    let delay = limits.delay / MILLISECOND;
-    add("limits", json!({ "modulus_margin": limits.modulus, "delay_margin_ms": delay }));
-    add("seed", json!(seed));
-    add("present", with_figures(problem.present()));
-    add("best", with_figures(&found.best));
-    if let Some(search) = &found.search {
-        add("designs", json!(search.designs));
-        add("runs", json!(search.runs));
-        add("pareto", pareto(found).into_iter().map(plain).collect());
-    }
-    let also = found.elsewhere.iter().map(|path| {
-        json!({ "input": path.name, "present": with_figures(&path.present), "tuned": with_figures(&path.tuned) })
-    });
-    add("also", also.collect());
-    let contrasts =
-        found.contrasts.iter().map(|c| json!({ "better": plain(&c.better), "worse": plain(&c.worse) }));
-    add("contrasts", contrasts.collect());
-    Value::Object(object)
 }
 
 /// Creates the scatter plots: cost over modulus margin and control activity, or over the cost on another

@@ -7,9 +7,8 @@ use virtual_axes_core::config::{
     Assignment, ConfigError, MachineConfig, Parameters, Value, ValueSource, parse_assignment,
 };
 use virtual_axes_core::machine::MachineParameters;
-use virtual_axes_core::trial::TrialOutcome;
-
-use crate::{axis_warnings, table};
+use virtual_axes_report::runs::SimulatedRun;
+pub use virtual_axes_report::runs::controller_name;
 
 /// Position controller of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -47,25 +46,6 @@ impl ControllerName {
             }
         };
         parameters.iter().filter_map(of_key).collect()
-    }
-}
-
-/// Returns the name of the controller of the axes, or several names joined by `+`.
-pub fn controller_name(parameters: &Parameters) -> String {
-    let mut names: Vec<String> = Vec::new();
-    let mut feedforward = false;
-    for (key, value) in parameters.iter() {
-        match value {
-            Value::Text(name) if key.ends_with(".position_loop.controller") && !names.contains(&name) => {
-                names.push(name);
-            }
-            Value::Double(weight) if key.contains(".feedforward.") => feedforward |= weight != 0.0,
-            _ => {}
-        }
-    }
-    match names.as_slice() {
-        [name] if name == "cascade" && !feedforward => "cascade-noff".to_owned(),
-        _ => names.join("+"),
     }
 }
 
@@ -128,55 +108,4 @@ pub fn checked(
 }
 
 /// One run of a command with its variant of the machine.
-#[derive(Debug)]
-pub struct VariantRun {
-    /// Name of the controller.
-    pub controller: String,
-    /// Changed parameters of all runs, then of this run, in the syntax of the command line.
-    pub changes: Vec<String>,
-    /// Number of changes that all runs share.
-    pub shared_changes: usize,
-    /// Machine of the run.
-    pub machine: MachineConfig,
-    /// Warnings on the input, such as a feed that is not reached. The verdict contains them.
-    pub input_warnings: Vec<String>,
-    /// Notes on the input, such as a limit without effect.
-    pub input_notes: Vec<String>,
-    /// Times and worst lines of a part program.
-    pub part_program: Option<ProgramFigures>,
-    /// Result of the run.
-    pub outcome: TrialOutcome,
-}
-
-impl VariantRun {
-    /// Returns the title that distinguishes the run from the others.
-    pub fn title(&self) -> String {
-        let mut title = self.controller.clone();
-        for change in self.changes.iter().skip(self.shared_changes) {
-            title.push_str(", ");
-            title.push_str(change);
-        }
-        title
-    }
-    /// Returns remarks on the run, one per line.
-    pub fn remarks(&self) -> Vec<String> {
-        let unit = "the unit of position_loop.gain is (m/min)/mm or (1000 °/min)/°, 16.667 1/s";
-        let with_unit = |warning: String| match warning.contains("position loop") {
-            true => format!("{warning}; {unit}"),
-            false => warning,
-        };
-        let loops = self.axis_warnings().into_iter().map(with_unit);
-        loops
-            .chain(self.input_warnings.clone())
-            .chain(self.input_notes.clone())
-            .chain(table::remarks(&self.outcome.figures))
-            .collect()
-    }
-
-    /// Returns warnings on the loops of the moving axes.
-    pub fn axis_warnings(&self) -> Vec<String> {
-        let figures = self.outcome.figures.axes.iter();
-        let moving = self.machine.axes().iter().zip(figures).filter(|(_, figures)| figures.moves);
-        moving.flat_map(|(axis, _)| axis_warnings::loops(axis, &self.machine.periods())).collect()
-    }
-}
+pub type VariantRun = SimulatedRun<ProgramFigures>;

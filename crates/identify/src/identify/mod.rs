@@ -8,6 +8,7 @@
 pub mod campaign;
 pub mod summary;
 
+mod axis_identification;
 mod backlash;
 mod closed_loop;
 mod covariance;
@@ -36,6 +37,9 @@ mod trace_experiments;
 mod validate;
 mod values;
 
+pub use axis_identification::{
+    AxisIdentification, AxisIdentificationError, AxisValidation, ConditionedRecording,
+};
 pub use closed_loop::{Experiment, SimulatedExperiment, find_experiments, simulate, simulate_all};
 pub use delays::{DelayFit, DelayParameter};
 pub use feedforward::{FeedforwardFit, FeedforwardRegression, fit_feedforward};

@@ -52,6 +52,17 @@ impl Finding {
     pub fn invalid(code: &'static str, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Finding { severity: Severity::Invalid, code, what: what.into(), remedy: remedy.into() }
     }
+
+    /// Returns severity, message and remedy on one line.
+    pub fn line(&self) -> String {
+        let severity = match self.severity {
+            Severity::Invalid => "invalid",
+            Severity::Missing => "missing",
+            Severity::Warning => "warning",
+            Severity::Note => "note",
+        };
+        format!("{severity}: {self}")
+    }
 }
 
 impl fmt::Display for Finding {

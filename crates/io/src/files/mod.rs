@@ -27,6 +27,7 @@ mod recording;
 mod trace;
 mod trace_csv;
 mod trace_mcap;
+mod tuning_json;
 
 pub use bounded_recording::{BoundedRecording, RecordedTopic};
 pub use cdr::encode_cdr;
@@ -49,6 +50,7 @@ pub use recording::{
 pub use trace::{TraceWriter, trace_writer};
 pub use trace_csv::TraceCsvWriter;
 pub use trace_mcap::TraceMcapWriter;
+pub use tuning_json::{costed_run_json, tuning_json};
 
 use virtual_axes_core::text::shortened;
 

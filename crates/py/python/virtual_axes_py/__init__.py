@@ -17,15 +17,18 @@ from __future__ import annotations
 from . import design
 from ._native import PartProgram, Scenario, machine_names, scenario_names
 from .chunks import SweepResult
+from .identification import Identification, identify
 from .machine import SIGNALS, Machine
 from .optimization import Optimum, optimize
 from .run import Run
 from .shards import merge
 from .stepper import Stepper
 from .study import SweepResults, random_variants, sweep
+from .tuning import TuningResult, tune
 
 __all__ = [
     "SIGNALS",
+    "Identification",
     "Machine",
     "Optimum",
     "PartProgram",
@@ -34,7 +37,9 @@ __all__ = [
     "Stepper",
     "SweepResult",
     "SweepResults",
+    "TuningResult",
     "design",
+    "identify",
     "machine_names",
     "merge",
     "nc_program",
@@ -43,6 +48,7 @@ __all__ = [
     "scenario",
     "scenario_names",
     "sweep",
+    "tune",
 ]
 
 

@@ -133,11 +133,15 @@ class Machine:
 
         Raises `ValueError` for setpoints of another shape or that the machine rejects, with time, axis and limit.
         """
-        table, text, count = self._native.simulate(self._setpoints(psec), list(signals), every_tick, figures)
-        return Run(self, table.pop("time"), table, json.loads(text), count)
+        given = self.setpoints(psec)
+        table, text, count = self._native.simulate(given, list(signals), every_tick, figures)
+        return Run(self, table.pop("time"), table, json.loads(text), count, given)
 
-    def _setpoints(self, psec: Setpoints) -> NDArray[np.float64] | _native.Scenario | _native.PartProgram:
-        """Returns the setpoints as the native module takes them."""
+    def setpoints(self, psec: Setpoints) -> NDArray[np.float64] | _native.Scenario | _native.PartProgram:
+        """Returns setpoints as an array (setpoints, axes), m or rad; scenarios and part programs as they are.
+
+        Raises `ValueError` for an unknown axis or columns of different lengths.
+        """
         if isinstance(psec, _native.Scenario | _native.PartProgram):
             return psec
         if not isinstance(psec, Mapping):

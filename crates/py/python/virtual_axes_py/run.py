@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+    from . import _native
     from .machine import Machine
 
 
@@ -33,6 +35,8 @@ class Run:
     """Errors, currents and saturation, with the keys and units of `virtual_axes run --json`."""
     setpoint_count: int
     """Number of setpoints; later rows are the settling time."""
+    setpoints: NDArray[np.float64] | _native.Scenario | _native.PartProgram
+    """Setpoints as given: array (setpoints, axes), m or rad, scenario or part program."""
 
     def __getattr__(self, name: str) -> NDArray[np.float64]:
         """Returns a recorded signal, as `run.position`."""
@@ -71,6 +75,17 @@ class Run:
         }
         return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
 
+    def to_mcap(self, path: str | os.PathLike[str]) -> None:
+        """Writes an MCAP recording with the messages of the node, one of each topic per position cycle.
+
+        It has the bytes of `virtual_axes run --trace`; the motion is simulated again. Raises `ValueError` for another
+        extension than `.mcap`, `OSError` if the file cannot be written; the file is replaced atomically.
+        """
+        name = os.fspath(path)
+        if not name.lower().endswith(".mcap"):
+            raise ValueError(f"{name}: the file extension must be .mcap")
+        self.machine.native.write_trace(self.setpoints, name)
+
     def plot(self, axes: list[str] | None = None) -> Figure:
         """Draws setpoint and position, following error and current over time (needs matplotlib).
 
@@ -96,8 +111,25 @@ class Run:
         rows[2].set_xlabel("time, s")
         return figure
 
+    def report(self) -> str:
+        """Returns the page of `virtual_axes run --report` as HTML: figures, and plots of path, errors and currents.
+
+        The motion is simulated again. A page is self-contained and has no script.
+        """
+        title, description = _title(self.setpoints)
+        return self.machine.native.report(self.setpoints, title, description)
+
     def _repr_html_(self) -> str:
-        """Returns the table of the axes for a notebook."""
+        """Returns the report for a notebook; the table of the axes if there is none, as for a removed part program."""
+        try:
+            page = self.report()
+        except (ValueError, OSError):
+            return self._table()
+        style = "width: 100%; height: 40em; border: 0"
+        return f'<iframe srcdoc="{escape(page)}" style="{style}" sandbox=""></iframe>'
+
+    def _table(self) -> str:
+        """Returns the table of the axes as HTML."""
         head = "<tr><th>axis</th><th>following error, max</th><th>RMS</th><th>peak current, A</th></tr>"
         rows = "".join(
             f"<tr><td>{escape(name)}</td><td>{error['max']:.1f} {axis['unit']}</td><td>{error['rms']:.1f}</td>"
@@ -108,3 +140,9 @@ class Run:
         contour = self.figures["contour_error_um"]
         note = f"<p>contour error: max {contour['max']:.2f} µm, RMS {contour['rms']:.2f} µm</p>" if contour else ""
         return f"<table>{head}{rows}</table>{note}"
+
+
+def _title(setpoints: Any) -> tuple[str, str]:
+    """Returns title and description of setpoints."""
+    name = getattr(setpoints, "name", None) or getattr(setpoints, "path", None)
+    return (str(name), str(getattr(setpoints, "description", ""))) if name else (f"{len(setpoints)} setpoints", "")

@@ -182,7 +182,7 @@ def sweep(
     if not 0 <= index < count:
         raise ValueError(f"shard ({index}, {count}): the first number must be from 0 to below the second")
     rows = variants if isinstance(variants, RandomVariants) else list(variants)
-    setup = Setup(machine, machine._setpoints(psec), figures, _threads(threads, executor))
+    setup = Setup(machine, machine.setpoints(psec), figures, _threads(threads, executor))
     store = None if out is None else shards.Store(Path(out))
     size = chunk or (store.chunk() if store else None) or _chunk_size(setup, rows, executor, count)
     if store:

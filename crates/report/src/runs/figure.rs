@@ -3,7 +3,7 @@
 use virtual_axes_core::trial::{AxisFigures, CircleFigures, Figures, Reference};
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MICROMETER, MILLIDEGREE, MILLIMETER};
 
-use crate::table::scale;
+use super::table::scale;
 
 /// One figure of a run.
 #[derive(Debug, Clone, Default, PartialEq)]

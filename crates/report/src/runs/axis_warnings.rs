@@ -5,7 +5,7 @@ use virtual_axes_core::design::{DesignError, check_stable, has_stable_poles};
 use virtual_axes_core::machine::{AxisError, design_controller, prediction_model};
 use virtual_axes_core::units::Rounded;
 
-use crate::axis::AxisUnits;
+use super::AxisUnits;
 
 /// Returns all warnings on an axis.
 pub fn all(axis: &AxisConfig, periods: &Periods) -> Vec<String> {

@@ -3,10 +3,10 @@
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::trial::{AxisFigures, Figures};
 use virtual_axes_core::units::{MICROMETER, MILLIDEGREE, Rounded};
-use virtual_axes_report::{Table, TableColumn};
 
-use crate::figure::{self, Figure};
-use crate::variant::VariantRun;
+use super::SimulatedRun;
+use super::figure::{self, Figure};
+use crate::{Table, TableColumn};
 
 /// Reason for a missing contour error.
 pub const NO_CONTOUR: &str = "no linear joint is named x, y or z";
@@ -117,7 +117,7 @@ pub fn path(figures: &Figures) -> Table {
 
 /// Creates tables with a row per figure and a column per run: path, circular tests, and axes. From the second run on, a
 /// cell has the difference from the first run.
-pub fn comparison(runs: &[VariantRun]) -> [Table; 3] {
+pub fn comparison<P>(runs: &[SimulatedRun<P>]) -> [Table; 3] {
     // The tables of all runs have equal rows.
     let ends = runs.iter().any(|run| figure::overshoots(&run.outcome.figures));
     let axes: Vec<_> = runs.iter().map(|run| figure::of_axes(&run.outcome.figures)).collect();
@@ -130,7 +130,7 @@ pub fn comparison(runs: &[VariantRun]) -> [Table; 3] {
     ]
 }
 
-fn columns_of(caption: &str, runs: &[VariantRun], figures: &[Vec<Figure>]) -> Table {
+fn columns_of<P>(caption: &str, runs: &[SimulatedRun<P>], figures: &[Vec<Figure>]) -> Table {
     let mut table = table(caption, &[("figure", ""), ("unit", "")]);
     match runs {
         [_] => table.columns.push(TableColumn::new("value", "")),
@@ -156,7 +156,7 @@ fn columns_of(caption: &str, runs: &[VariantRun], figures: &[Vec<Figure>]) -> Ta
 }
 
 /// Returns the explanation of the differences in [`comparison`].
-pub fn comparison_note(runs: &[VariantRun]) -> Option<String> {
+pub fn comparison_note<P>(runs: &[SimulatedRun<P>]) -> Option<String> {
     let first = runs.first().filter(|_| runs.len() > 1)?;
     Some(format!(
         "in parentheses: difference from {} in percent, of signed figures in their unit",
@@ -165,7 +165,7 @@ pub fn comparison_note(runs: &[VariantRun]) -> Option<String> {
 }
 
 /// Returns the definition of the reversal spikes, for runs with circles.
-pub fn spike_note(runs: &[VariantRun]) -> Option<String> {
+pub fn spike_note<P>(runs: &[SimulatedRun<P>]) -> Option<String> {
     let has_circle = runs.iter().any(|run| !run.outcome.figures.circles.is_empty());
     has_circle.then(|| {
         "reversal spike: the radial deviation within 20° of a reversal that differs most from the mean, minus the mean"

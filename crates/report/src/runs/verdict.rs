@@ -1,14 +1,12 @@
 //! The result of runs in one line each, with which text output and reports begin.
 
-use virtual_axes_core::text::escaped;
 use virtual_axes_core::trial::Figures;
 
-use crate::figure::{self, Figure, percent};
-use crate::variant::VariantRun;
-use crate::{table, text_table};
+use super::figure::{self, Figure, percent};
+use super::{SimulatedRun, table};
 
 /// Returns the verdict of a single run, or a line for each further run that compares it with the first one.
-pub fn lines(runs: &[VariantRun]) -> Vec<String> {
+pub fn lines<P>(runs: &[SimulatedRun<P>]) -> Vec<String> {
     match runs {
         [] => Vec::new(),
         [run] => vec![single(run)],
@@ -16,17 +14,7 @@ pub fn lines(runs: &[VariantRun]) -> Vec<String> {
     }
 }
 
-/// Returns the lines as text, one per run.
-pub fn text(runs: &[VariantRun]) -> String {
-    lines(runs).into_iter().map(|line| escaped(&line) + "\n").collect()
-}
-
-/// Returns the lines as text that fits a terminal.
-pub fn wrapped(runs: &[VariantRun]) -> String {
-    lines(runs).into_iter().map(|line| text_table::wrapped_line(&escaped(&line))).collect()
-}
-
-fn single(run: &VariantRun) -> String {
+fn single<P>(run: &SimulatedRun<P>) -> String {
     let figures = &run.outcome.figures;
     let main = main_figure(figures);
     let contour = figure::of_path(figures, false);
@@ -39,7 +27,7 @@ fn single(run: &VariantRun) -> String {
     text + &warnings(run)
 }
 
-fn compared(first: &VariantRun, run: &VariantRun) -> String {
+fn compared<P>(first: &SimulatedRun<P>, run: &SimulatedRun<P>) -> String {
     let [from, to] = [main_figure(&first.outcome.figures), main_figure(&run.outcome.figures)];
     let change = percent(&from, &to).map(|change| format!(", {change}")).unwrap_or_default();
     let warnings = warnings(run);
@@ -73,7 +61,7 @@ fn worst_axis(figures: &Figures) -> Option<Figure> {
 }
 
 /// Returns warnings on loops and input, and the limits that axes reached, beginning with a semicolon; empty if there are none.
-fn warnings(run: &VariantRun) -> String {
+fn warnings<P>(run: &SimulatedRun<P>) -> String {
     let mut text = String::new();
     for warning in run.axis_warnings().iter().chain(&run.input_warnings) {
         text.push_str(&format!("; {warning}"));

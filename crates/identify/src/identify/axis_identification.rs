@@ -1,0 +1,236 @@
+//! Complete identification of one axis: recordings, identification, validation, summary.
+
+use std::cmp::Reverse;
+use std::io;
+
+use thiserror::Error;
+use virtual_axes_core::config::{AxisConfig, ConfigError, ParameterKind, Parameters, Periods};
+use virtual_axes_core::machine::MachineError;
+use virtual_axes_core::units::{MILLISECOND, MILLISECOND_NS};
+
+use super::summary::IdentificationSummary;
+use super::{
+    Agreement, FeedforwardMode, Identification, IdentificationInput, IdentificationOptions, IdentifiedValue,
+    are_production_traces, constant_lag, identify, invalid_agreement, update_parameters, validate,
+};
+use crate::recording::{Conditioning, ConditioningError, Finding, RawRecording, Signals, condition};
+
+/// Lag of the position, relative to 1 / Kp, below which velocity feedforward must be active.
+const SHORT: f64 = 0.7;
+
+/// Error of the identification of an axis.
+#[derive(Debug, Error)]
+pub enum AxisIdentificationError {
+    /// Recording that is not plausible for the axis.
+    #[error(transparent)]
+    Conditioning(#[from] ConditioningError),
+    /// Recording without feedforward signals whose active feedforward is unknown.
+    #[error(
+        "{name}: has no {missing}, and the lag of the position ({lag_ms:.1} ms) does not tell whether feedforward was active: \
+         without it the lag is at least 1 / Kp, {without_ms:.1} ms; give {option} off, velocity or both"
+    )]
+    UnknownFeedforward {
+        /// Name of the recording.
+        name: String,
+        /// Missing signal.
+        missing: &'static str,
+        /// Lag of the position, ms; NaN if it is unknown.
+        lag_ms: f64,
+        /// Lag without feedforward, ms.
+        without_ms: f64,
+        /// Option that names the active feedforward.
+        option: String,
+    },
+    /// Recordings that determine no parameter.
+    #[error("no parameter of {axis} could be identified{findings}")]
+    NoResult {
+        /// Name of the axis.
+        axis: String,
+        /// Findings, each on a line of its own after a line feed.
+        findings: String,
+    },
+    /// Invalid parameters of the initial machine.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Error of the interrupt check.
+    #[error(transparent)]
+    Interrupted(#[from] io::Error),
+    /// Validation recording that cannot be compared.
+    #[error(transparent)]
+    Validation(#[from] MachineError),
+}
+
+/// Recording after conditioning, with its active feedforward and findings.
+#[derive(Debug)]
+pub struct ConditionedRecording {
+    /// Conditioned signals.
+    pub signals: Signals,
+    /// Active feedforward as given or inferred.
+    pub feedforward: Option<FeedforwardMode>,
+    /// Findings of reading and conditioning.
+    pub findings: Vec<Finding>,
+}
+
+impl ConditionedRecording {
+    /// Conditions the recording `raw` of `axis`, which was read with `findings`. `feedforward` is the value of `option`,
+    /// which errors name.
+    ///
+    /// # Errors
+    /// [`AxisIdentificationError`] if the recording is not plausible, or if its active feedforward is unknown.
+    pub fn new(
+        (raw, mut findings): (&RawRecording, Vec<Finding>),
+        (axis, periods): (&AxisConfig, &Periods),
+        conditioning: &Conditioning,
+        (mut feedforward, option): (Option<FeedforwardMode>, &str),
+    ) -> Result<Self, AxisIdentificationError> {
+        let (signals, more) = condition(raw, axis, periods, conditioning)?;
+        findings.extend(more);
+        let input = IdentificationInput { signals: &signals, feedforward };
+        let is_inferred = are_production_traces(&[input], axis, periods);
+        if let (None, Some(missing), false) = (feedforward, missing_feedforward(&signals), is_inferred) {
+            let lag = constant_lag(&signals).map(|(lag, _)| lag);
+            let without = 1.0 / axis.position_loop.gain;
+            let (lag_ms, without_ms) = (lag.unwrap_or(f64::NAN) / MILLISECOND, without / MILLISECOND);
+            if !lag.is_some_and(|lag| lag < SHORT * without) {
+                let (name, option) = (signals.name.clone(), option.to_owned());
+                return Err(AxisIdentificationError::UnknownFeedforward {
+                    name,
+                    missing,
+                    lag_ms,
+                    without_ms,
+                    option,
+                });
+            }
+            let mode = if axis.feedforward.torque != 0.0 {
+                FeedforwardMode::Both
+            } else {
+                FeedforwardMode::Velocity
+            };
+            feedforward = Some(mode);
+            let what = format!(
+                "{}: feedforward {} is assumed: the position lags by {lag_ms:.1} ms, without feedforward it would by at least \
+                 1 / Kp, {without_ms:.1} ms",
+                signals.name,
+                mode.name(),
+            );
+            findings.push(Finding::note("feedforward-inferred", what));
+        }
+        Ok(ConditionedRecording { signals, feedforward, findings })
+    }
+
+    /// Converts the recording to the input of the identification.
+    pub fn input(&self) -> IdentificationInput<'_> {
+        IdentificationInput { signals: &self.signals, feedforward: self.feedforward }
+    }
+}
+
+/// Returns the name of the feedforward signal that is missing to determine the active feedforward.
+fn missing_feedforward(signals: &Signals) -> Option<&'static str> {
+    let is_active = |channel: &[f64]| channel.iter().any(|value| *value != 0.0);
+    signals.spans.iter().filter(|span| span.psec.is_some()).find_map(|span| {
+        match (&span.velocity_feedforward, &span.torque_feedforward) {
+            (None, _) => Some("velocity feedforward (VFFWS)"),
+            (Some(velocity), None) if is_active(velocity) => Some("torque feedforward (TFFWS)"),
+            _ => None,
+        }
+    })
+}
+
+/// Comparison of the identified axis with a validation recording.
+#[derive(Debug)]
+pub struct AxisValidation {
+    /// Validation recording.
+    pub recorded: ConditionedRecording,
+    /// Deviations between simulation and recording.
+    pub agreement: Agreement,
+}
+
+/// Identification of an axis with its validation and summary.
+#[derive(Debug)]
+pub struct AxisIdentification {
+    /// Recordings that were used for the identification.
+    pub recordings: Vec<ConditionedRecording>,
+    /// Result of the identification.
+    pub identification: Identification,
+    /// Validation results.
+    pub validations: Vec<AxisValidation>,
+    /// Figures of the output.
+    pub summary: IdentificationSummary,
+    /// Parameters of the machine with the identified values; those of the initial machine if they are invalid.
+    pub identified: Parameters,
+}
+
+impl AxisIdentification {
+    /// Identifies the axis `index` of the machine `parameters` from `recordings` and compares it with the recordings
+    /// `others`. `start` is called with the name of each part before it starts.
+    ///
+    /// # Errors
+    /// [`AxisIdentificationError`] if no parameter is determined, or of `start`.
+    pub fn new(
+        (parameters, index): (&Parameters, usize),
+        recordings: Vec<ConditionedRecording>,
+        others: Vec<ConditionedRecording>,
+        options: &IdentificationOptions,
+        start: impl Fn(&str) -> io::Result<()>,
+    ) -> Result<Self, AxisIdentificationError> {
+        let config = parameters.machine_config()?;
+        let (axis, periods) = (&config.axes()[index], config.periods());
+        start(&format!("identifying {}", axis.name()))?;
+        let inputs: Vec<IdentificationInput<'_>> =
+            recordings.iter().map(ConditionedRecording::input).collect();
+        let identification = identify(&inputs, axis, &periods, options);
+        let of_files = recordings.iter().chain(&others).flat_map(|recorded| &recorded.findings);
+        // The same file can be given twice.
+        let mut findings: Vec<Finding> = Vec::new();
+        for finding in of_files.chain(&identification.findings) {
+            if !findings.contains(finding) {
+                findings.push(finding.clone());
+            }
+        }
+        findings.sort_by_key(|finding| Reverse(finding.severity));
+        let values = identification.values(parameters, axis.name());
+        if !values.iter().any(|value| is_determined(value, parameters, &periods)) {
+            let lines = findings.iter().map(|finding| format!("\n{}", finding.line()));
+            let axis = axis.name().to_owned();
+            return Err(AxisIdentificationError::NoResult { axis, findings: lines.collect() });
+        }
+        let mut identified = parameters.clone();
+        let updated = update_parameters(&mut identified, axis.name(), &values);
+        if let Err(error) = updated.and_then(|()| identified.machine_config().map(drop)) {
+            // The values are shown, with the reason why they cannot be used.
+            let remedy = "check the recordings and the machine file";
+            findings.insert(0, Finding::invalid("rejected", error.to_string(), remedy));
+            identified = parameters.clone();
+        }
+        // Values rounded to the digits of the machine file.
+        let updated = identified.machine_config()?;
+
+        start(&format!("validating {}", axis.name()))?;
+        let validations = others.into_iter().map(|mut recorded| {
+            recorded.feedforward = recorded.feedforward.or(identification.inferred_feedforward);
+            let agreement = validate(&recorded.input(), &updated.axes()[index], &updated.periods())?;
+            Ok(AxisValidation { recorded, agreement })
+        });
+        let validations: Vec<AxisValidation> = validations.collect::<Result<_, AxisIdentificationError>>()?;
+        for AxisValidation { recorded, agreement } in &validations {
+            findings.extend(invalid_agreement(&recorded.signals.name, agreement, axis.kind()));
+        }
+        findings.sort_by_key(|finding| Reverse(finding.severity));
+        let validated: Vec<(IdentificationInput<'_>, &Agreement)> =
+            validations.iter().map(|v| (v.recorded.input(), &v.agreement)).collect();
+        let summary =
+            IdentificationSummary::new(config.name(), &inputs, &identification, values, &validated, findings);
+        Ok(AxisIdentification { recordings, identification, validations, summary, identified })
+    }
+}
+
+/// Returns true if the recordings determine a value: false for a delay whose interval is its whole range.
+fn is_determined(value: &IdentifiedValue, parameters: &Parameters, periods: &Periods) -> bool {
+    let Some([low, high]) = value.interval else { return true };
+    // Delays are tried in steps of a position cycle, which may not reach the longest one.
+    let step = periods.position as f64 / MILLISECOND_NS as f64;
+    match parameters.definition(&value.key).map(|definition| definition.kind) {
+        Some(ParameterKind::Number { min, max }) => low > min || high + step <= max,
+        _ => true,
+    }
+}

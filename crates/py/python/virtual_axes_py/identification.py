@@ -1,0 +1,142 @@
+"""Identification of the parameters of an axis from recordings."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _native
+from .machine import Machine
+
+if TYPE_CHECKING:
+    Recording = str | os.PathLike[str] | Mapping[str, ArrayLike]
+    Feedforward = Literal["off", "velocity", "both"]
+
+
+class Identification:
+    """Identified parameters of an axis, with findings and the agreement with the recordings."""
+
+    def __init__(self, native: _native.Identification) -> None:
+        """Wraps a native result; use `identify`."""
+        self._native = native
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """All results with the keys and units of `virtual_axes identify --json`."""
+        found: dict[str, Any] = json.loads(self._native.json())
+        return found
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Identified parameters by key, in the units of the machine file."""
+        return {value["key"]: value["value"] for value in self.summary["values"]}
+
+    @property
+    def deviations(self) -> dict[str, float | None]:
+        """Standard errors of the parameters by key, in their units; None where there is none, as for delays."""
+        return {value["key"]: value["standard_error"] for value in self.summary["values"]}
+
+    @property
+    def findings(self) -> list[str]:
+        """Findings with their remedies, the most severe first: `invalid: …`, `missing: …`, `warning: …`, `note: …`."""
+        return self._native.findings()
+
+    @property
+    def is_valid(self) -> bool:
+        """True unless a finding says that the result must not be used."""
+        return all(finding["severity"] != "invalid" for finding in self.summary["findings"])
+
+    @property
+    def machine(self) -> Machine:
+        """Machine with the identified parameters; `ValueError` with the findings if the result is invalid."""
+        if not self.is_valid:
+            invalid = [line for line in self.findings if line.startswith("invalid: ")]
+            raise ValueError("invalid result, there is no identified machine:\n" + "\n".join(invalid))
+        return Machine(self._native.machine())
+
+    def report(self) -> str:
+        """Returns the page of `virtual_axes identify --report` as HTML."""
+        return self._native.report()
+
+    def __repr__(self) -> str:
+        """Returns axis, number of parameters and of findings."""
+        axis, values = self.summary["axis"], self.summary["values"]
+        return f"Identification({axis!r}, {len(values)} parameters, {len(self.findings)} findings)"
+
+
+def identify(
+    recordings: Recording | Sequence[Recording],
+    axis: str,
+    machine: Machine | None = None,
+    *,
+    validate: Recording | Sequence[Recording] = (),
+    feedforward: Feedforward | Sequence[Feedforward] = (),
+    validate_feedforward: Feedforward | Sequence[Feedforward] = (),
+    refine: Sequence[str] | None = None,
+    free_i0: bool = False,
+    column: Sequence[str] = (),
+    columns: str | os.PathLike[str] | None = None,
+    topic: Sequence[str] = (),
+    joint: str | None = None,
+    format: str | None = None,
+    rate_hz: float | None = None,
+    cutoff_hz: float | None = None,
+    current_lag_ms: float | None = None,
+    trace_filter_hz: float | None = None,
+    psec_shift: float | Literal["auto"] | None = None,
+) -> Identification:
+    """Identifies friction, gravity, inertia, feedforward, delays and gain of an axis, as `virtual_axes identify` does.
+
+    `recordings` are files (CSV, MCAP, exports of controls) or dictionaries of equally long channels: `time` (s),
+    `position` and `psec` (m or rad), `velocity` (m/s or rad/s of the axis), `current` (A), `velocity_feedforward`
+    (rad/s of the motor) and `torque_feedforward` (N·m). `machine` (default: the first built-in one) has the initial
+    values.
+
+    The options are those of the command: `validate` are recordings to compare with the result; `feedforward` is the
+    active one, `off`, `velocity` or `both`, for all or for each recording; `refine` are the groups that the refinement
+    in closed loop adjusts (`inertia`, `friction`, `gravity`, `feedforward`, `gain`; by default all, `()` for none);
+    `free_i0` refines the breakaway current by itself; `column`, `columns`, `topic`, `joint`, `format` and `rate_hz`
+    read the files; `cutoff_hz`, `current_lag_ms`, `trace_filter_hz` and `psec_shift` (ms, or `auto`) condition the
+    signals.
+
+    Raises `ValueError` with the command's text for an unreadable or implausible recording, or if no parameter can be
+    identified. Releases the global interpreter lock.
+    """
+    options = {
+        "column": list(column),
+        "columns": columns,
+        "topic": list(topic),
+        "joint": joint,
+        "format": format,
+        "rate_hz": rate_hz,
+        "cutoff_hz": cutoff_hz,
+        "current_lag_ms": current_lag_ms,
+        "trace_filter_hz": trace_filter_hz,
+        "psec_shift": psec_shift,
+        "feedforward": [feedforward] if isinstance(feedforward, str) else list(feedforward),
+        "validate_feedforward": (
+            [validate_feedforward] if isinstance(validate_feedforward, str) else list(validate_feedforward)
+        ),
+        "refine": None if refine is None else list(refine),
+        "free_i0": free_i0,
+    }
+    native = (machine if machine is not None else Machine.load()).native
+    return Identification(_native.identify(native, axis, _sources(recordings), _sources(validate), options))
+
+
+def _sources(given: Recording | Sequence[Recording]) -> list[str | dict[str, Any]]:
+    """Returns recordings as the native module takes them."""
+    several = [given] if isinstance(given, str | os.PathLike | Mapping) else list(given)
+    found: list[str | dict[str, Any]] = []
+    for one in several:
+        if isinstance(one, Mapping):
+            found.append({name: np.ascontiguousarray(values, dtype=np.float64) for name, values in one.items()})
+        else:
+            found.append(os.fspath(one))
+    return found

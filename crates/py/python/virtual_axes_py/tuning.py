@@ -1,0 +1,113 @@
+"""Tuning of controllers for a path."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from . import _native
+from .machine import Machine
+
+if TYPE_CHECKING:
+    from .machine import Setpoints
+
+
+@dataclass(frozen=True, eq=False)
+class TuningResult:
+    """Best tuning of a search, and all tunings of its Pareto front."""
+
+    machine: Machine
+    """Machine with the best tuning."""
+    summary: dict[str, Any]
+    """All results with the keys and units of `virtual_axes tune --json`."""
+
+    @property
+    def cost(self) -> float:
+        """Cost of the best tuning, in `summary["cost_unit"]`."""
+        return float(self.summary["best"]["cost"])
+
+    @property
+    def initial_cost(self) -> float:
+        """Cost of the initial tuning, in `summary["cost_unit"]`."""
+        return float(self.summary["present"]["cost"])
+
+    @property
+    def pareto(self) -> list[dict[str, Any]]:
+        """Tunings with the least cost for their modulus margin, with cost and margins; empty for a contrast."""
+        return list(self.summary.get("pareto", []))
+
+    def __repr__(self) -> str:
+        """Returns initial and best cost."""
+        return f"TuningResult(cost {self.initial_cost:.6g} → {self.cost:.6g} {self.summary['cost_unit']})"
+
+
+def tune(
+    machine: Machine,
+    psec: Setpoints,
+    *,
+    controller: Literal["gpc", "cascade"] | None = None,
+    cost: str = "contour",
+    modulus_margin: float | None = None,
+    delay_margin_ms: float | None = None,
+    seed: int | None = None,
+    designs: int | None = None,
+    also: Sequence[Setpoints] = (),
+    contrast: bool = False,
+) -> TuningResult:
+    """Searches the tuning of the position controllers with the least cost on a path, as `virtual_axes tune` does.
+
+    `psec` is the path, as for `Machine.simulate`; its axes that move are tuned. `controller` is `gpc` (N1, N2, Nu, λ)
+    or `cascade` (Kp and feedforward weights), by default that of the machine. `cost` is a weighted sum such as
+    `contour=1,activity=0.1` of `contour`, `contour-rms`, `following`, `rms`, `current`, `activity`. Tunings keep
+    `modulus_margin` (default 0.5) and `delay_margin_ms` (default 5) on all axes and reach no limit. `seed` (default 1)
+    is for the cascade, `designs` the least number of predictive controllers in the first grid. The best tuning is
+    evaluated on the paths `also` as well; with `contrast`, the search is for predictive controllers that are better
+    on `psec` and worse on the only path of `also`.
+
+    Raises `ValueError` with the command's text if an option is out of range or no tuning is within the margins.
+    Releases the global interpreter lock and uses all cores.
+    """
+    chosen = controller if controller is not None else _controller(machine)
+    if contrast and (chosen != "gpc" or len(also) != 1):
+        raise ValueError("contrast requires controller gpc and exactly one path in also")
+    if designs is not None and (contrast or chosen != "gpc"):
+        raise ValueError("designs requires controller gpc without contrast")
+    if designs is not None and not 1 <= designs <= 1_000_000:
+        raise ValueError(f"designs {designs}: must be in 1 … 1000000")
+    if seed is not None and chosen != "cascade":
+        raise ValueError("seed requires controller cascade; the search for gpc has no seed")
+    if seed is not None and seed < 0:
+        raise ValueError(f"seed {seed}: must be at least 0")
+    options = {
+        "controller": chosen,
+        "contrast": contrast,
+        "cost": cost,
+        "modulus_margin": modulus_margin,
+        "delay_margin_ms": delay_margin_ms,
+        "seed": 1 if seed is None else seed,
+        "designs": designs,
+    }
+    paths = [_named(machine, one, f"path {index + 1}") for index, one in enumerate([psec, *also])]
+    text, tuned = _native.tune(machine.native, paths[0], paths[1:], options)
+    return TuningResult(Machine(tuned), json.loads(text))
+
+
+def _named(machine: Machine, psec: Setpoints, name: str) -> tuple[str, str, Any]:
+    """Returns setpoints with their name and description."""
+    if isinstance(psec, _native.Scenario):
+        return psec.name, psec.description, psec
+    if isinstance(psec, _native.PartProgram):
+        return psec.path, "", psec
+    return name, "", machine.setpoints(psec)
+
+
+def _controller(machine: Machine) -> str:
+    """Returns the controller of all axes if it can be tuned."""
+    parameters: Mapping[str, Any] = machine.parameters
+    names = {str(parameters[f"{axis}.position_loop.controller"]) for axis in machine.axes}
+    if len(names) == 1 and names <= {"gpc", "cascade"}:
+        return names.pop()
+    found = " and ".join(sorted(names))
+    raise ValueError(f"controller: must be gpc or cascade; the machine has {found}, which cannot be tuned")

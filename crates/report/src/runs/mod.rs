@@ -1,0 +1,14 @@
+//! Simulated runs in text: figures, tables, the verdict in one line, warnings on parameters, and the page.
+
+pub mod axis_warnings;
+pub mod figure;
+pub mod table;
+pub mod verdict;
+
+mod axis_units;
+mod page;
+mod simulated_run;
+
+pub use axis_units::AxisUnits;
+pub use page::SimulationPage;
+pub use simulated_run::{SimulatedRun, controller_name};

@@ -1,0 +1,126 @@
+//! Page of simulated runs: verdict, tables of figures, and plots.
+
+use std::io::{self, Write};
+
+use virtual_axes_core::assess::SignalRecording;
+use virtual_axes_core::config::{AxisConfig, AxisKind, GpcConfig, PositionControllerConfig};
+use virtual_axes_core::units::{MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, seconds};
+
+use super::{SimulatedRun, table, verdict};
+use crate::{Report, ReportRun, Scatter, Section};
+
+/// Contents of the page of one or several simulated runs of one trial.
+#[derive(Debug)]
+pub struct SimulationPage<'a, P = ()> {
+    /// Name of the trial.
+    pub title: &'a str,
+    /// Description of the trial; can be empty.
+    pub description: &'a str,
+    /// Name of the machine.
+    pub machine: &'a str,
+    /// Runs, the first of which the others are compared with.
+    pub runs: &'a [SimulatedRun<P>],
+    /// Sections below the figures, such as that of a part program.
+    pub sections: Vec<Section>,
+    /// Scatter plots of a search.
+    pub scatters: &'a [Scatter],
+    /// Names and values that allow the runs to be repeated.
+    pub provenance: Vec<(String, String)>,
+}
+
+impl<P> SimulationPage<'_, P> {
+    /// Writes the page as HTML. Equal runs give equal bytes.
+    ///
+    /// # Errors
+    /// Returns the errors of the output.
+    pub fn write(&self, output: &mut impl Write) -> io::Result<()> {
+        let titles: Vec<String> = self.runs.iter().map(SimulatedRun::title).collect();
+        let empty = SignalRecording::default();
+        let run = |(run, title): (&SimulatedRun<P>, &'_ String)| (facts(self.machine, run), title.clone());
+        let described: Vec<(Vec<(String, String)>, String)> =
+            self.runs.iter().zip(&titles).map(run).collect();
+        let report = Report {
+            title: self.title,
+            description: self.description,
+            verdict: verdict::lines(self.runs),
+            tables: table::comparison(self.runs).to_vec(),
+            notes: table::comparison_note(self.runs)
+                .into_iter()
+                .chain(table::spike_note(self.runs))
+                .chain([table::SAMPLING.to_owned()])
+                .collect(),
+            runs: described
+                .iter()
+                .zip(self.runs)
+                .map(|((facts, title), run)| ReportRun {
+                    title,
+                    facts: facts.clone(),
+                    recording: run.outcome.recording.as_ref().unwrap_or(&empty),
+                })
+                .collect(),
+            sections: self.sections.clone(),
+            provenance: self.provenance.clone(),
+        };
+        report.write_with(self.scatters, output)
+    }
+}
+
+/// Returns machine, controller and changed parameters of a run, and remarks on it.
+fn facts<P>(machine: &str, run: &SimulatedRun<P>) -> Vec<(String, String)> {
+    let figures = &run.outcome.figures;
+    let mut facts =
+        vec![("machine".to_owned(), machine.to_owned()), ("controller".to_owned(), run.controller.clone())];
+    let extrapolated = figures.axes.iter().filter(|axis| axis.friction_extrapolated);
+    facts.extend(extrapolated.map(|axis| ("friction law extrapolated".to_owned(), axis.name.clone())));
+    for axis in &figures.axes {
+        if let Some(time) = table::outside(axis) {
+            facts.push(("outside its travel limits".to_owned(), format!("{}, {time} s", axis.name)));
+        }
+    }
+    if figures.contour.is_none() {
+        facts.push(("contour error".to_owned(), table::NO_CONTOUR.to_owned()));
+    }
+    facts.extend(table::more(figures).map(|line| ("without figures".to_owned(), line)));
+    let warnings = run.axis_warnings().into_iter().chain(run.input_warnings.clone());
+    facts.extend(warnings.map(|warning| ("warning".to_owned(), warning)));
+    facts.extend(run.input_notes.iter().map(|note| ("note".to_owned(), note.clone())));
+    facts.extend(run.changes.iter().map(|change| ("set".to_owned(), change.clone())));
+    let moving = run.machine.axes().iter().zip(&figures.axes).filter(|(_, figures)| figures.moves);
+    facts.extend(moving.map(|(axis, _)| (axis.name().to_owned(), values(axis))));
+    facts
+}
+
+/// Returns the tuning of the position controller of an axis, and its delays.
+fn values(axis: &AxisConfig) -> String {
+    let unit = match axis.kind() {
+        AxisKind::Linear => "(m/min)/mm",
+        AxisKind::Rotary => "(1000 °/min)/°",
+    };
+    let rounded = |value: f64| Rounded(value).to_string();
+    let milliseconds = |delay: Nanoseconds| format!("{} ms", Rounded(seconds(delay) / MILLISECOND));
+    let delays = &axis.delays;
+    let alpha = milliseconds(delays.alpha);
+    match &axis.position_loop.controller {
+        PositionControllerConfig::Cascade => format!(
+            "Kp {} {unit}, VFFW {}, TFFW {} kg·m², α {alpha}, β {}, γ {}",
+            rounded(axis.position_loop.gain / POSITION_GAIN),
+            rounded(axis.feedforward.velocity),
+            rounded(axis.feedforward.torque),
+            milliseconds(delays.beta),
+            milliseconds(delays.gamma),
+        ),
+        PositionControllerConfig::Gpc(GpcConfig { n1, n2, nu, lambda_rel, lambda }) => {
+            let lambda = match lambda {
+                Some(lambda) => format!("λ {} s²", rounded(*lambda)),
+                None => format!("λ_rel {}", rounded(*lambda_rel)),
+            };
+            format!("N1 {n1}, N2 {n2}, Nu {nu}, {lambda}, α {alpha}")
+        }
+        PositionControllerConfig::Rst(rst) => format!(
+            "degrees of R, S, T: {}, {}, {}, α {alpha}",
+            rst.r.len().saturating_sub(1),
+            rst.s.len().saturating_sub(1),
+            rst.t.len().saturating_sub(1),
+        ),
+    }
+}

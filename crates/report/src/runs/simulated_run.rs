@@ -1,0 +1,79 @@
+//! One simulated run with its variant of the machine.
+
+use virtual_axes_core::config::{MachineConfig, Parameters, Value};
+use virtual_axes_core::trial::TrialOutcome;
+
+use super::{axis_warnings, table};
+
+/// Returns the name of the controller of the axes, or several names joined by `+`.
+pub fn controller_name(parameters: &Parameters) -> String {
+    let mut names: Vec<String> = Vec::new();
+    let mut feedforward = false;
+    for (key, value) in parameters.iter() {
+        match value {
+            Value::Text(name) if key.ends_with(".position_loop.controller") && !names.contains(&name) => {
+                names.push(name);
+            }
+            Value::Double(weight) if key.contains(".feedforward.") => feedforward |= weight != 0.0,
+            _ => {}
+        }
+    }
+    match names.as_slice() {
+        [name] if name == "cascade" && !feedforward => "cascade-noff".to_owned(),
+        _ => names.join("+"),
+    }
+}
+
+/// Simulated run with its variant of the machine. `P` are the figures of a part program.
+#[derive(Debug)]
+pub struct SimulatedRun<P = ()> {
+    /// Name of the controller.
+    pub controller: String,
+    /// Changed parameters of all runs, then of this run, in the syntax of the command line.
+    pub changes: Vec<String>,
+    /// Number of changes that all runs share.
+    pub shared_changes: usize,
+    /// Machine of the run.
+    pub machine: MachineConfig,
+    /// Warnings on the input, such as a feed that is not reached. The verdict contains them.
+    pub input_warnings: Vec<String>,
+    /// Notes on the input, such as a limit without effect.
+    pub input_notes: Vec<String>,
+    /// Times and worst lines of a part program.
+    pub part_program: Option<P>,
+    /// Result of the run.
+    pub outcome: TrialOutcome,
+}
+
+impl<P> SimulatedRun<P> {
+    /// Returns the title that distinguishes the run from the others.
+    pub fn title(&self) -> String {
+        let mut title = self.controller.clone();
+        for change in self.changes.iter().skip(self.shared_changes) {
+            title.push_str(", ");
+            title.push_str(change);
+        }
+        title
+    }
+    /// Returns remarks on the run, one per line.
+    pub fn remarks(&self) -> Vec<String> {
+        let unit = "the unit of position_loop.gain is (m/min)/mm or (1000 °/min)/°, 16.667 1/s";
+        let with_unit = |warning: String| match warning.contains("position loop") {
+            true => format!("{warning}; {unit}"),
+            false => warning,
+        };
+        let loops = self.axis_warnings().into_iter().map(with_unit);
+        loops
+            .chain(self.input_warnings.clone())
+            .chain(self.input_notes.clone())
+            .chain(table::remarks(&self.outcome.figures))
+            .collect()
+    }
+
+    /// Returns warnings on the loops of the moving axes.
+    pub fn axis_warnings(&self) -> Vec<String> {
+        let figures = self.outcome.figures.axes.iter();
+        let moving = self.machine.axes().iter().zip(figures).filter(|(_, figures)| figures.moves);
+        moving.flat_map(|(axis, _)| axis_warnings::loops(axis, &self.machine.periods())).collect()
+    }
+}

@@ -1,0 +1,160 @@
+"""Module `virtual_axes_py`: identification, tuning, recordings and reports equal those of the command."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import virtual_axes_py as va
+from node_process import node_binary
+
+COMMAND = str(Path(node_binary()).with_name("virtual_axes"))
+
+
+def command(*arguments: str | Path) -> str:
+    """Returns the output of the command."""
+    done = subprocess.run([COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def machine() -> va.Machine:
+    """Returns the default machine."""
+    return va.Machine.load()
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Returns the trace of the campaign's part without feedforward, of X."""
+    folder = tmp_path_factory.mktemp("campaign")
+    command("psec", "campaign", "--axis", "x", "--part", "off", "--out", folder / "psec.csv")
+    trace = folder / "trace.csv"
+    command("run", folder / "psec.csv", "--controller", "cascade-noff", "--trace", trace, "--json")
+    return trace
+
+
+@pytest.fixture(scope="module")
+def expected(campaign: Path) -> dict:
+    """Returns the identification of the command."""
+    return json.loads(command("identify", campaign, "--axis", "x", "--feedforward", "off", "--json"))
+
+
+def test_an_identification_from_a_file_has_the_values_of_the_command(
+    campaign: Path, expected: dict, machine: va.Machine
+) -> None:
+    found = va.identify(campaign, "x", feedforward="off")
+    assert found.summary == expected
+    assert found.parameters == {value["key"]: value["value"] for value in expected["values"]}
+    assert len(found.findings) == len(expected["findings"])
+    # The simulated machine is the initial one, so that the identification must return its friction.
+    key = "x.friction.a"
+    assert found.parameters[key] == pytest.approx(machine.parameters[key], rel=0.02)
+    assert found.machine.parameters[key] == found.parameters[key] != machine.parameters[key]
+    assert found.machine.parameters["y.friction.a"] == machine.parameters["y.friction.a"]
+
+
+def test_an_identification_from_arrays_has_the_values_of_the_file(campaign: Path, expected: dict) -> None:
+    table = np.genfromtxt(campaign, delimiter=",", names=True, deletechars="")
+    channels = {"time": table["time"]}
+    for channel in ("psec", "position", "velocity", "current", "velocity_feedforward", "torque_feedforward"):
+        if f"x.{channel}" in table.dtype.names:
+            channels[channel] = table[f"x.{channel}"]
+    assert {"psec", "position", "current"} <= set(channels)
+    found = va.identify(channels, "x", feedforward="off")
+    errors = {value["key"]: value["standard_error"] for value in expected["values"]}
+    for value in expected["values"]:
+        assert found.parameters[value["key"]] == value["value"], value["key"]
+    assert found.deviations == errors
+
+
+def test_the_report_of_an_identification_has_its_values(campaign: Path) -> None:
+    page = va.identify(campaign, "x", feedforward="off", refine=()).report()
+    assert page.startswith("<!DOCTYPE html>") and "x.friction.a" in page and "<svg" in page
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "text"),
+    [
+        (("/nowhere.csv", "x"), {}, "/nowhere.csv"),
+        (({"time": [0.0], "angle": [0.0]}, "x"), {}, 'channel "angle" is unknown'),
+        (({"time": [0.0, 1.0], "position": [0.0]}, "x"), {}, "recording 1"),
+        ((([]), "x"), {}, "at least one"),
+        (("/nowhere.csv", "w"), {}, '"w" is unknown; known are x, y, z, a, c'),
+        (("/nowhere.csv", "x"), {"feedforward": "some"}, "off, velocity or both"),
+        (("/nowhere.csv", "x"), {"feedforward": ["off", "both"]}, "2 values for 1 recordings"),
+        (("/nowhere.csv", "x"), {"refine": ["mass"]}, "mass"),
+        (("/nowhere.csv", "x"), {"psec_shift": 2000.0}, "-1000 to 1000 ms"),
+        (("/nowhere.csv", "x"), {"format": "xls"}, "xls"),
+    ],
+)
+def test_an_error_of_an_identification_names_the_thing(arguments: tuple, options: dict, text: str) -> None:
+    with pytest.raises(ValueError) as raised:
+        va.identify(*arguments, **options)
+    assert text in str(raised.value)
+
+
+@pytest.mark.parametrize("controller", ["gpc", "cascade"])
+def test_a_tuning_has_the_values_of_the_command(controller: str, machine: va.Machine) -> None:
+    text = command("tune", "corner-90", "--controller", controller, "--also", "x-constant", "--json")
+    found = va.tune(machine, va.scenario("corner-90"), controller=controller, also=[va.scenario("x-constant")])
+    assert found.summary == json.loads(text)
+    assert found.cost < found.initial_cost
+    assert found.pareto[0]["cost"] == found.cost
+    again = found.machine.simulate(va.scenario("corner-90"))
+    assert again.figures["contour_error_um"]["max"] == pytest.approx(found.cost, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"controller": "rst"}, "must be gpc or cascade"),
+        ({"controller": "gpc", "seed": 3}, "seed requires controller cascade"),
+        ({"controller": "cascade", "designs": 3}, "designs requires controller gpc"),
+        ({"controller": "gpc", "designs": 0}, "1 … 1000000"),
+        ({"controller": "gpc", "modulus_margin": 2.0}, "modulus_margin 2: must be in 0 … 1"),
+        ({"controller": "gpc", "cost": "beauty"}, "beauty"),
+        ({"controller": "gpc", "contrast": True}, "exactly one path"),
+        ({"controller": "gpc", "modulus_margin": 1.0}, "x-constant: "),
+    ],
+)
+def test_an_error_of_a_tuning_names_the_option(options: dict, text: str, machine: va.Machine) -> None:
+    with pytest.raises(ValueError) as raised:
+        va.tune(machine, va.scenario("x-constant"), **options)
+    assert text in str(raised.value)
+
+
+def test_a_recording_of_a_run_has_the_bytes_of_the_command(machine: va.Machine, tmp_path: Path) -> None:
+    command("run", "corner-90", "--trace", tmp_path / "command.mcap", "--json")
+    run = machine.simulate(va.scenario("corner-90"), signals=["position"], figures="axes")
+    run.to_mcap(tmp_path / "module.mcap")
+    assert (tmp_path / "module.mcap").read_bytes() == (tmp_path / "command.mcap").read_bytes()
+    with pytest.raises(ValueError, match=r"must be \.mcap"):
+        run.to_mcap(tmp_path / "trace.csv")
+    with pytest.raises(OSError):
+        run.to_mcap("/nowhere/trace.mcap")
+
+
+def test_the_report_of_a_run_is_the_page_of_the_command(machine: va.Machine, tmp_path: Path) -> None:
+    run = machine.simulate(va.scenario("ballbar"), signals=[])
+    command("run", "ballbar", "--report", tmp_path / "page.html", "--quiet")
+    page, expected = run.report(), (tmp_path / "page.html").read_text()
+    # The last section of the page says how it was made: date, command line and machine file.
+    end = expected.index("virtual_axes 0")
+    head = expected[: expected.rindex("<h2", 0, end)]
+    assert len(head) > 50_000 and page.startswith(head)
+    embedded = run._repr_html_()
+    assert embedded.startswith("<iframe srcdoc=") and "circular deviation G" in embedded
+
+
+def test_a_run_without_its_part_program_shows_a_table(machine: va.Machine, tmp_path: Path) -> None:
+    program = tmp_path / "line.nc"
+    program.write_text("G21 G90 G94\nG1 X10 F1000\nM30\n")
+    run = machine.simulate(va.nc_program(str(program)))
+    assert "<iframe" in run._repr_html_()
+    program.unlink()
+    assert run._repr_html_().startswith("<table>")
