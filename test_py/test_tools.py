@@ -30,6 +30,7 @@ LOOKS = 60
         ("measure_publish_once", ["--load=-1"], ["--load", "'-1'", "from 0 on"]),
         ("measure_fragments", ["5000"], ["5000000000 octets", "4294967295"]),
         ("measure_gym", ["--machines", "0"], ["--machines", "'0'", "from 1 on"]),
+        ("measure_python", ["--rounds", "0"], ["--rounds", "'0'", "from 1 on"]),
         ("measure_study", ["--designs", "many"], ["--designs", "'many'", "from 1 on"]),
         ("keystore", ["--domain", "233", "store", "/one"], ["--domain", "'233'", "from 0 to 232"]),
         ("run_graph", ["--seconds", "long"], ["--seconds", "'long'"]),

@@ -28,7 +28,8 @@ ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "docs" / "internals" / "dependencies.md"
 BEGIN, END = "<!-- crates -->\n", "<!-- /crates -->\n"
 PLATFORMS = ("x86_64-unknown-linux-gnu", "aarch64-unknown-linux-gnu")
-FILES_AND_NETWORK = {"clap", "mcap", "rustdds", "ros2-client", "tokio"}
+TERMINAL = {"clap", "comfy-table", "ctrlc", "indicatif", "tracing-subscriber"}
+FILES_AND_NETWORK = TERMINAL | {"mcap", "rustdds", "ros2-client", "tokio"}
 LAYERS: dict[str, set[str]] = {
     "virtual_axes_core": FILES_AND_NETWORK | {"cdr-encoding", "quick-xml", "serde_json"},
     "virtual_axes_identify": FILES_AND_NETWORK | {"cdr-encoding", "quick-xml"},

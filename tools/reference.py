@@ -5,7 +5,7 @@
     tools/reference.py --write                            # rewrites the pages
 
 Sources: `virtual_axes interface --json`, `virtual_axes parameters --json`, help texts, msg/action/*.action,
-msg/*.msg, launch/*.launch.py.
+msg/*.msg, launch/*.launch.py, and crates/py/python.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from typing import Any
 import options
 from reference_markdown import MARK, console, page, section, table
 from reference_parameters import parameter_pages
+from reference_python import python_page
 from reference_sources import MessageSection, action, help_texts, launch_file, message
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -58,6 +59,7 @@ class Reference:
         """Returns all generated pages by path in docs/reference."""
         pages = {
             "topics.md": self.topics(),
+            "python.md": python_page(),
             "rejections.md": self.rejections(),
             "diagnostics.md": self.diagnostics(),
             "messages.md": messages(),

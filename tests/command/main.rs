@@ -4,6 +4,7 @@ mod command;
 mod command_campaign;
 mod command_common;
 mod command_design;
+mod examples;
 mod files_output;
 mod hints;
 mod identify_command;
