@@ -1,5 +1,7 @@
 //! The numbered examples, run as functions.
 
+// Its main function reads the argument of the process, which is that of the test here.
+#[allow(dead_code)]
 #[path = "../../examples/01_simulate_csv.rs"]
 mod simulate_csv;
 
