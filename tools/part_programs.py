@@ -5,25 +5,35 @@
     tools/part_programs.py --write                           writes these files
     tools/part_programs.py --raster 150000 > raster.nc       raster of at least that many motions
     tools/part_programs.py --s-path 0.1 > s.nc               S with points every 0.1 mm
+    tools/part_programs.py --measure                         time and memory of `virtual_axes` on rasters: Markdown
 
 The raster follows the surface z = 0.8 mm sin(2 pi x / 20 mm) cos(2 pi y / 26 mm) in passes of 24 mm, 0.3 mm apart. As
 in CAM, lines are as long as the chord error of 0.01 um allows, 50 um at most, and coordinates have 4 decimals.
 
 The S has two arcs of 270 degrees with a radius of 30 mm. The tool leans to the left of the path, by 15 degrees with a
 wave of 10 degrees. The program controls the tool center point (G43.4), for machines with the tables A and C.
+
+The measurement executes `virtual_axes run`, `check` and `psec` of `cargo build --release` on rasters of 37 500, 75 000
+and 150 000 motions: elapsed time, and processor time, which other load changes less. Segments per minute and relative
+time are of the processor time; the latter is that per segment, divided by that of the shortest raster.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
+import subprocess
 import sys
+import tempfile
+import time
 from collections.abc import Iterator
 from math import cos, degrees, pi, sin, sqrt
 from pathlib import Path
 
 import options
 
-FOLDER = Path(__file__).resolve().parent.parent / "config" / "programs"
+CHECKOUT = Path(__file__).resolve().parent.parent
+FOLDER = CHECKOUT / "config" / "programs"
 COMMITTED_SEGMENTS = 12_000
 COMMITTED_SPACING = 0.5
 
@@ -36,6 +46,9 @@ RADIUS, ARC = 30.0, 3 * pi / 2
 TILT, TILT_WAVE = 15.0, 10.0
 S_FEED = 2000
 
+MEASURED_SEGMENTS = (37_500, 75_000, 150_000)
+TIMEOUT = 1800
+
 
 def arguments() -> argparse.Namespace:
     """Reads the command line."""
@@ -44,6 +57,7 @@ def arguments() -> argparse.Namespace:
     choice = parser.add_mutually_exclusive_group()
     choice.add_argument("--raster", type=options.whole, metavar="MOTIONS", help="prints a raster")
     choice.add_argument("--s-path", type=options.positive, metavar="MM", help="prints an S with this spacing")
+    choice.add_argument("--measure", action="store_true", help="prints time and memory on rasters")
     return parser.parse_args()
 
 
@@ -124,9 +138,54 @@ def text(lines: Iterator[str]) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
+def measured(command: list[str]) -> tuple[float, float, float]:
+    """Runs a command without output; returns elapsed and processor time in s and the largest resident memory in MiB."""
+    began = time.monotonic()
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+        while True:
+            identifier, status, usage = os.wait4(process.pid, os.WNOHANG)
+            seconds = time.monotonic() - began
+            if identifier:
+                break
+            if seconds > TIMEOUT:
+                process.kill()
+            time.sleep(0.02)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0:
+        raise subprocess.CalledProcessError(process.returncode, command)
+    return seconds, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+
+
+def measure() -> None:
+    """Prints a table of times and memory of the commands on rasters."""
+    binary = CHECKOUT / "target" / "release" / "virtual_axes"
+    print("| command | segments | elapsed (s) | processor (s) | segments per minute | relative time | memory (MiB) |")
+    print("|---|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        programs = []
+        for segments in MEASURED_SEGMENTS:
+            program = Path(folder) / f"raster-{segments}.nc"
+            program.write_text(text(raster(segments)))
+            programs.append((program, sum(1 for _ in raster_points(segments))))
+        for name in ("run", "check", "psec"):
+            out = ["--out", f"{folder}/setpoints.csv"] if name == "psec" else []
+            first = None
+            for program, segments in programs:
+                elapsed, used, memory = measured([str(binary), name, str(program), *out])
+                first = first or used / segments
+                print(
+                    f"| `{name}` | {segments} | {elapsed:.1f} | {used:.1f} | {segments / used * 60e-6:.1f} million "
+                    f"| {used / segments / first:.2f} | {memory:.0f} |",
+                    flush=True,
+                )
+
+
 def main() -> int:
-    """Prints a program, or writes or compares the files."""
+    """Prints a program or measurements, or writes or compares the files."""
     args = arguments()
+    if args.measure:
+        measure()
+        return 0
     if args.raster or args.s_path:
         for line in raster(args.raster) if args.raster else s_path(args.s_path):
             print(line)

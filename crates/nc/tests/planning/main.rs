@@ -3,9 +3,11 @@
 mod deviation;
 mod feed_override;
 mod five_axis;
+mod global_optimum;
 mod limits;
 mod optimum;
 mod profile;
 mod programs;
 mod random;
+mod speed_search;
 mod timeline;
