@@ -1,13 +1,9 @@
-//! Fuzz targets of text inputs: machine files, parameters, scenarios, part programs, ROS arguments.
-
-use std::io::Cursor;
+//! Fuzz targets of text inputs: machine files, parameters, scenarios, ROS arguments.
 
 use virtual_axes::ingress::args::Command;
 use virtual_axes_core::config::{Parameters, ValueSource};
 use virtual_axes_core::machine::MachineParameters;
 use virtual_axes_core::scenario::Scenario;
-use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions};
-use virtual_axes_nc::motion::ProgramStep;
 
 use crate::{JOINTS, MACHINE, PARAMETERS, assert_one_line, bounded};
 
@@ -15,10 +11,6 @@ use crate::{JOINTS, MACHINE, PARAMETERS, assert_one_line, bounded};
 const SAMPLES: u32 = 64;
 /// Largest number of planned moves.
 const MAX_MOVES: usize = 40;
-/// Largest number of steps of a part program, which can be endless.
-const MAX_STEPS: usize = 2000;
-/// Number of lines that a part program may repeat.
-const REPEATED_LINES: u64 = 2000;
 
 /// Asserts that parameters round-trip through YAML bit by bit.
 fn assert_reads_back(parameters: &Parameters) {
@@ -134,28 +126,5 @@ pub fn ros_args(data: &[u8]) {
             assert!(!warning.is_empty());
         }
         assert!(args.parameters().count() <= text.lines().count());
-    });
-}
-
-/// Interprets a part program.
-pub fn part_program(data: &[u8]) {
-    let options =
-        InterpreterOptions { repeated_lines: REPEATED_LINES, ..InterpreterOptions::for_machine(&MACHINE) };
-    bounded(data.len(), || {
-        for step in Interpreter::new(Cursor::new(data), "part.nc", options).take(MAX_STEPS) {
-            match step {
-                Ok(ProgramStep::Motion(motion)) => {
-                    assert!(
-                        motion.start.iter().chain(&motion.end).all(|value| value.is_finite()),
-                        "{motion:?}"
-                    );
-                }
-                Ok(ProgramStep::Event { .. }) => {}
-                Err(error) => {
-                    assert_one_line(&error.to_string());
-                    assert!(error.to_string().starts_with("part.nc:"), "{error}");
-                }
-            }
-        }
     });
 }
