@@ -88,7 +88,7 @@ def seen(request: pytest.FixtureRequest) -> Iterator[tuple[Run, AxesClient]]:
     """Yields a node started in one of these ways, after all described interfaces exist."""
     run = RUNS[request.param]
     with Node(run.ros_args, name=run.name) as process, AxesClient(process=process, connect=False) as drive:
-        drive.wait_for(drive.sees, 10, "node in the graph")
+        drive.wait_for(drive.is_in_graph, 10, "node in the graph")
         wanted = {HALT.get(name, name) for name in run.expected("in", "out", "service")}
 
         def there() -> bool:
@@ -313,7 +313,7 @@ def test_the_page_of_the_environment_has_every_variable_and_no_other():
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
     """Returns a copy of what tools/reference.py reads and writes."""
-    for folder in ("docs/reference", "launch", "msg", "tools"):
+    for folder in ("docs/reference", "launch", "msg", "tools", "crates/py/python"):
         shutil.copytree(ROOT / folder, tmp_path / folder)
     return tmp_path
 

@@ -19,7 +19,7 @@ def test_exits_within_a_second_and_disposes_its_endpoints(
 ):
     """Status 0 within 1 s; removed from rclpy's graph within 2 s, not after the lease of 50 s."""
     drive = start()
-    drive.wait_for(drive.sees, 5, "node in the graph")
+    drive.wait_for(drive.is_in_graph, 5, "node in the graph")
     if moving:
         start_swing(drive)
     process, drive.process = drive.process, None
