@@ -220,7 +220,9 @@ def test_a_trajectory_preempts_a_program(programs: Follow) -> None:
     ended = sent.ended(30)
     assert (ended.status, ended.result.error_code) == (GoalStatus.STATUS_ABORTED, Result.PREEMPTED)
     assert ended.result.error_string == f"preempted by trajectory {number} of psec"
-    assert drive.end(number, 30).status == R.COMPLETED
+    completed = drive.end(number, 30)
+    assert completed.status == R.COMPLETED
+    drive.wait_until(to_ns(completed.header.stamp), 10)
     psec = drive.latest("psec")
     assert psec["x"] == 0.01
     drive.wait_until(drive.now() + 20 * TSP_NS, 10)

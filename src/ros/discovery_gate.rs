@@ -14,7 +14,7 @@
 //!
 //! RustDDS has no interface for this. Its two threads, recognized by their names, pass the gate where they wait for
 //! events, in the `epoll_wait` of `virtual_axes_node`. In other programs, and in systems without epoll, the gate has
-//! no effect. When the participant is renewed ([`super::renewal`]), only the threads of the new one are held: those that
+//! no effect. When the participant is renewed (module `renewal`), only the threads of the new one are held: those that
 //! reach the gate for the first time after it was closed.
 
 use std::cell::Cell;

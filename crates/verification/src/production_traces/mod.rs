@@ -9,7 +9,7 @@
 //! - [`ProductionProgram`] is a random part program for three linear axes; several programs can run on one axis.
 //! - [`TraceRecorder`] sets filter, sampling, quantization, noise, gaps and jitter of [`HiddenAxis::record`].
 //! - [`AxisGuess`] contains what a user knows about a hidden axis.
-//! - [`write_csv`], [`machine_file`] and [`truth_file`] write traces and parameters.
+//! - [`write_csv`], [`machine_file()`] and [`truth_file`] write traces and parameters.
 //!
 //! Every random number derives from a seed: equal seeds give bit-identical traces on one machine.
 //!
