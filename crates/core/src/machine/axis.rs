@@ -191,6 +191,12 @@ impl Axis {
         self.velocity_offset = offset;
     }
 
+    /// Lets the load act from now on, within a position cycle; returns its torque, N·m at the motor.
+    pub(super) fn apply_load(&mut self, p: &AxisParameters) -> f64 {
+        self.inputs.load = p.loops.plant.load_torque(self.load);
+        self.inputs.load
+    }
+
     /// Executes the position loop at the start of a position cycle: returns the inputs to the inner loops.
     ///
     /// `psec` is the setpoint of the cycle, `preview` contains the known setpoints after it.
@@ -269,6 +275,20 @@ impl Axis {
         motor: &MotorState,
         record: &TickRecord,
     ) {
+        let load = if tick == 0 { self.previous_load } else { self.inputs.load };
+        self.sample = self.sample_with(p, tick, motor, record, load);
+    }
+
+    /// Returns the signals with the controller outputs of a tick; `load` is that over the tick before `motor`, N·m at the
+    /// motor.
+    fn sample_with(
+        &self,
+        p: &AxisParameters,
+        tick: usize,
+        motor: &MotorState,
+        record: &TickRecord,
+        load: f64,
+    ) -> AxisSample {
         let plant = &p.loops.plant;
         let torque_constant = plant.torque_constant();
         let velocity_cycle = tick / p.ticks_per_velocity as usize;
@@ -276,8 +296,7 @@ impl Axis {
             .compensation
             .as_ref()
             .map_or(0.0, |compensation| self.compensation_torque(compensation, p, velocity_cycle));
-        let load = if tick == 0 { self.previous_load } else { self.inputs.load };
-        self.sample = AxisSample {
+        AxisSample {
             position: plant.position(motor.angle),
             velocity: plant.velocity(motor.speed),
             current: motor.current,
@@ -294,7 +313,19 @@ impl Axis {
             saturated: record.saturated > 0.0,
             friction_extrapolated: plant.is_friction_extrapolated(motor.speed),
             ..self.sample
-        };
+        }
+    }
+
+    /// Returns the signals after a tick of the present position cycle, with the controller outputs of this tick.
+    pub(super) fn sample_after(
+        &self,
+        p: &AxisParameters,
+        tick: usize,
+        state: &InnerLoopState,
+        record: &TickRecord,
+    ) -> AxisSample {
+        let record = TickRecord { friction: state.friction, gravity: state.gravity, ..*record };
+        self.sample_with(p, tick, &state.motor, &record, self.inputs.load)
     }
 
     /// Returns the signals at the start of the last position cycle, or at the tick that

@@ -4,6 +4,7 @@ use pulp::{Arch, Scalar, Simd, WithSimd};
 
 use super::inner_loops::{
     Aligned, AxisBlock, CycleStatistics, CycleTicks, InnerLoopInputs, InnerLoopState, InnerLoops, TickRecord,
+    TickSpan,
 };
 use crate::drive::MotorState;
 
@@ -153,17 +154,28 @@ impl AxisBank {
 
     /// Runs one position cycle; `record_all` records every tick, otherwise the first one only.
     pub fn run(&mut self, record_all: bool) {
+        self.run_span(TickSpan::whole(self.ticks, record_all));
+    }
+
+    /// Runs ticks of a position cycle; spans of one cycle follow each other.
+    pub fn run_span(&mut self, span: TickSpan) {
         let ticks = self.ticks;
         match &mut self.blocks {
-            AxisBlocks::X4(blocks) => run_blocks(self.width, BlockRun { blocks, ticks, record_all }),
-            AxisBlocks::X8(blocks) => run_blocks(self.width, BlockRun { blocks, ticks, record_all }),
+            AxisBlocks::X4(blocks) => run_blocks(self.width, BlockRun { blocks, ticks, span }),
+            AxisBlocks::X8(blocks) => run_blocks(self.width, BlockRun { blocks, ticks, span }),
         }
+    }
+
+    /// Sets the load torque of an axis for the rest of the position cycle, N·m at the motor.
+    pub fn set_load_torque(&mut self, axis: usize, torque: f64) {
+        with_lane!(&mut self.blocks, axis, block_and_lane_mut, |block, lane| block
+            .set_load_torque(lane, torque));
     }
 }
 
-/// Runs one position cycle with the selected SIMD width.
+/// Runs ticks of a position cycle with the selected SIMD width.
 fn run_blocks<const L: usize>(width: SimdWidth, run: BlockRun<'_, L>) {
-    if run.record_all {
+    if run.span.record_all {
         let record = || Aligned(TickRecord::default().fill());
         run.blocks.iter_mut().for_each(|block| block.records.resize_with(run.ticks.position, record));
     }
@@ -195,11 +207,11 @@ fn dispatch_up_to_four_lanes<A: WithSimd>(operation: A) -> A::Output {
     }
 }
 
-/// Operation that runs one position cycle of blocks.
+/// Operation that runs ticks of a position cycle of blocks.
 struct BlockRun<'a, const L: usize> {
     blocks: &'a mut [AxisBlock<L>],
     ticks: CycleTicks,
-    record_all: bool,
+    span: TickSpan,
 }
 
 impl<const L: usize> WithSimd for BlockRun<'_, L> {
@@ -209,7 +221,7 @@ impl<const L: usize> WithSimd for BlockRun<'_, L> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         for block in self.blocks {
-            block.run(simd, self.ticks, self.record_all);
+            block.run(simd, self.ticks, self.span);
         }
     }
 }

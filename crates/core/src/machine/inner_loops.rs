@@ -108,6 +108,19 @@ soa_struct! {
     }
 }
 
+soa_struct! {
+    /// Values within a velocity cycle, for a position cycle that is run in several spans.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    struct SpanState {
+        /// Amounts by which the speed and current setpoints exceeded their limits, added up.
+        excess: N,
+        /// Speed drop by friction over the last tick, rad/s.
+        speed_drop: N,
+        /// Ticks of the position cycle so far with a setpoint at its limit.
+        saturated_ticks: N,
+    }
+}
+
 /// Value aligned to a cache line of 64 bytes, the size of the largest SIMD vector.
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
@@ -139,6 +152,24 @@ impl CycleTicks {
     }
 }
 
+/// Ticks of a position cycle to run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct TickSpan {
+    /// First tick, counted from the start of the position cycle.
+    pub first: usize,
+    /// Tick after the last one.
+    pub end: usize,
+    /// True to record every tick, otherwise the first one of the position cycle only.
+    pub record_all: bool,
+}
+
+impl TickSpan {
+    /// Returns the span of a whole position cycle.
+    pub fn whole(ticks: CycleTicks, record_all: bool) -> Self {
+        TickSpan { first: 0, end: ticks.position, record_all }
+    }
+}
+
 /// Parameters, inputs, state and results of `L` axes, one per SIMD lane.
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
@@ -151,6 +182,8 @@ pub(super) struct AxisBlock<const L: usize> {
     /// Expansions of gravity near the present angles.
     gravity_expansion: Aligned<GravityExpansion<[f64; L]>>,
     pub statistics: Aligned<CycleStatistics<[f64; L]>>,
+    /// Values to continue within a position cycle.
+    span_state: Aligned<SpanState<[f64; L]>>,
     /// True if gravity of any axis depends on its position.
     has_tilting_axis: bool,
     /// Friction compensation of each velocity cycle, N·m at the motor; empty without compensation.
@@ -171,6 +204,7 @@ impl<const L: usize> AxisBlock<L> {
             friction_expansion: Aligned(loops.plant.friction_speed_drop.expand(0.0).fill()),
             gravity_expansion: Aligned(loops.plant.gravity.expand(0.0).fill()),
             statistics: Aligned(CycleStatistics::default().fill()),
+            span_state: Aligned(SpanState::default().fill()),
             has_tilting_axis: loops.plant.gravity.is_position_dependent(),
             compensation: Vec::new(),
             motors: vec![Aligned(MotorState::default().fill()); ticks.position],
@@ -192,6 +226,11 @@ impl<const L: usize> AxisBlock<L> {
     /// Sets the inputs of a lane for the next position cycle.
     pub fn set_inputs(&mut self, lane: usize, inputs: &InnerLoopInputs) {
         self.inputs.0.set_lane(lane, inputs);
+    }
+
+    /// Sets the load torque of a lane for the rest of the position cycle, N·m at the motor.
+    pub fn set_load_torque(&mut self, lane: usize, torque: f64) {
+        self.inputs.0.load[lane] = torque;
     }
 
     /// Sets the parameters of a lane.
@@ -219,7 +258,7 @@ impl<const L: usize> AxisBlock<L> {
         }
     }
 
-    /// Runs one position cycle; `record_all` records every tick, otherwise the first one only.
+    /// Runs a position cycle or, tick by tick, a part of it. Parts in order have the results of the whole, bit by bit.
     ///
     /// Each velocity cycle (period Tsv) executes the velocity PI controller with feedforward, current limit and
     /// anti-windup (Prévost fig. 3 and eqs. 6 to 8):
@@ -241,60 +280,82 @@ impl<const L: usize> AxisBlock<L> {
     /// C_friction: torque that gives ωₙ₊₁ = 0, clamped to ±Kt i_f(|ωₙ|)
     /// ```
     #[inline(always)]
-    pub fn run<S: Simd>(&mut self, simd: S, ticks: CycleTicks, record_all: bool) {
+    pub fn run<S: Simd>(&mut self, simd: S, ticks: CycleTicks, span: TickSpan) {
         if L.is_multiple_of(Unroll2::<Vector<S>>::LANES) {
-            self.run_chunks::<S, Unroll2<Vector<S>>>(simd, ticks, record_all);
+            self.run_chunks::<S, Unroll2<Vector<S>>>(simd, ticks, span);
         } else {
-            self.run_chunks::<S, Vector<S>>(simd, ticks, record_all);
+            self.run_chunks::<S, Vector<S>>(simd, ticks, span);
         }
     }
 
     #[inline(always)]
-    fn run_chunks<S: Simd, N: SimdLoad<S>>(&mut self, simd: S, ticks: CycleTicks, record_all: bool) {
+    fn run_chunks<S: Simd, N: SimdLoad<S>>(&mut self, simd: S, ticks: CycleTicks, span: TickSpan) {
         assert!(L.is_multiple_of(N::LANES), "a vector is no wider than a block");
+        let is_whole = span.first == 0 && span.end == ticks.position;
         for index in 0..L / N::LANES {
-            if self.has_tilting_axis {
-                self.run_chunk::<S, N, true>(simd, index, ticks, record_all);
-            } else {
-                self.run_chunk::<S, N, false>(simd, index, ticks, record_all);
+            match (is_whole, self.has_tilting_axis) {
+                (true, false) => self.run_chunk::<S, N, false, false>(simd, index, ticks, span),
+                (true, true) => self.run_chunk::<S, N, true, false>(simd, index, ticks, span),
+                // The difference is time only.
+                (false, _) => self.run_chunk::<S, N, true, true>(simd, index, ticks, span),
             }
         }
     }
 
-    /// Runs one position cycle of the lanes `index`·`N::LANES` … (`index` + 1)·`N::LANES` − 1; see [`run`](Self::run).
+    /// Runs the lanes `index`·`N::LANES` … (`index` + 1)·`N::LANES` − 1; see [`run`](Self::run). With `IS_PART` false,
+    /// the span is a whole position cycle.
     #[inline(always)]
-    fn run_chunk<S: Simd, N: SimdLoad<S>, const HAS_TILTING_AXIS: bool>(
+    fn run_chunk<S: Simd, N: SimdLoad<S>, const HAS_TILTING_AXIS: bool, const IS_PART: bool>(
         &mut self,
         simd: S,
         index: usize,
         ticks: CycleTicks,
-        record_all: bool,
+        span: TickSpan,
     ) {
         align_stack_frame();
+        let record_all = span.record_all;
+        let continues = IS_PART && span.first > 0;
         let loops: InnerLoops<N> = self.loops.0.load(simd, index);
         let inputs: InnerLoopInputs<N> = self.inputs.0.load(simd, index);
         let mut friction_expansion: FrictionExpansion<N> = self.friction_expansion.0.load(simd, index);
         let mut state: InnerLoopState<N> = self.state.0.load(simd, index);
         let zero = state.friction.splat(0.0);
         let one = zero.splat(1.0);
-        state.max_current_excess = zero;
         let mut saturated_ticks = zero;
         let mut gravity_expansion: GravityExpansion<N> = self.gravity_expansion.0.load(simd, index);
-        let mut gravity = match HAS_TILTING_AXIS {
-            true => loops.plant.gravity_torque_with_expansion(&mut gravity_expansion, state.motor.angle),
-            false => loops.plant.weight_torque(),
-        };
-        let mut external = inputs.load - gravity;
         // Speed drop by friction over the previous tick, rad/s.
         let mut speed_drop = zero;
+        let mut excess = zero;
+        let mut gravity = if continues {
+            let kept: SpanState<N> = self.span_state.0.load(simd, index);
+            (excess, speed_drop, saturated_ticks) = (kept.excess, kept.speed_drop, kept.saturated_ticks);
+            state.gravity
+        } else {
+            state.max_current_excess = zero;
+            match HAS_TILTING_AXIS {
+                true => loops.plant.gravity_torque_with_expansion(&mut gravity_expansion, state.motor.angle),
+                false => loops.plant.weight_torque(),
+            }
+        };
+        let mut external = inputs.load - gravity;
         for velocity_cycle in 0..ticks.velocity_cycles() {
-            let compensation = match self.compensation.get(velocity_cycle) {
-                Some(row) => N::load(simd, &row.0, index),
-                None => zero,
-            };
-            let excess = loops.control_velocity(&inputs, &mut state, velocity_cycle as f64, compensation);
-            let first = velocity_cycle * ticks.velocity;
-            for tick in first..first + ticks.velocity {
+            let (mut first, mut end) =
+                (velocity_cycle * ticks.velocity, (velocity_cycle + 1) * ticks.velocity);
+            let is_begun = IS_PART && first < span.first;
+            if IS_PART {
+                (first, end) = (first.max(span.first), end.min(span.end));
+                if first >= end {
+                    continue;
+                }
+            }
+            if !is_begun {
+                let compensation = match self.compensation.get(velocity_cycle) {
+                    Some(row) => N::load(simd, &row.0, index),
+                    None => zero,
+                };
+                excess = loops.control_velocity(&inputs, &mut state, velocity_cycle as f64, compensation);
+            }
+            for tick in first..end {
                 let max_speed_drop = loops
                     .plant
                     .friction_speed_drop
@@ -329,9 +390,13 @@ impl<const L: usize> AxisBlock<L> {
             self.gravity_expansion.0.store(index, &gravity_expansion);
         }
         self.state.0.store(index, &state);
+        if IS_PART {
+            self.span_state.0.store(index, &SpanState { excess, speed_drop, saturated_ticks });
+        }
         // A loop of its own: the loop above uses all registers.
         let mut statistics = CycleStatistics { peak_current: zero, peak_speed: zero, saturated_ticks };
-        for row in &self.motors {
+        let rows = if IS_PART { &self.motors[..span.end] } else { &self.motors };
+        for row in rows {
             let motor: MotorState<N> = row.0.load(simd, index);
             statistics.peak_current = motor.current.abs().max(statistics.peak_current);
             statistics.peak_speed = motor.speed.abs().max(statistics.peak_speed);

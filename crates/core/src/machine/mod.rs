@@ -25,7 +25,7 @@ use crate::drive::DriveError;
 use crate::units::Nanoseconds;
 
 use bank::AxisBank;
-use inner_loops::{CycleTicks, InnerLoops};
+use inner_loops::{CycleTicks, InnerLoops, TickSpan};
 
 /// Error of building a machine or changing its parameters.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -179,7 +179,7 @@ impl Machine {
         self.bank.set_simd_width(width);
     }
 
-    /// Reindexs gains, weights, delays or plant parameters between two position cycles and keeps the states (bumpless
+    /// Applies other gains, weights, delays or plant parameters between two position cycles and keeps the states (bumpless
     /// transfer).
     ///
     /// Allocates only if the longest delay or the preview changes the length of the setpoint history.
@@ -275,6 +275,9 @@ impl Machine {
     /// Afterwards the samples of the axes are those at the start of the position cycle;
     /// [`position`](Self::position) and [`activity`](Self::activity) return data of all ticks.
     pub fn advance(&mut self, psec: &[f64], preview: &[f64]) {
+        if !self.is_at_cycle_start() {
+            return self.advance_ticks(self.ticks_per_period(), psec, preview);
+        }
         self.execute_position_loops(psec, preview);
         self.bank.run(false);
         self.update_samples(0);
@@ -296,6 +299,48 @@ impl Machine {
         self.update_samples(0);
     }
 
+    /// Advances by `count` ticks, for forces that change within a position cycle.
+    ///
+    /// Setpoints and preview are those of [`advance`](Self::advance). They are read at the start of each position cycle
+    /// among the ticks and not within one. Loads act from the first of the ticks. Any split of a position cycle has the
+    /// results of the whole, bit by bit. Afterwards [`sample_at_end`](Self::sample_at_end) has the state after the last
+    /// tick; [`position`](Self::position) and [`activity`](Self::activity) have the ticks of the position cycle so far.
+    pub fn advance_ticks(&mut self, count: usize, psec: &[f64], preview: &[f64]) {
+        let period = self.ticks_per_period();
+        let mut left = count;
+        while left > 0 {
+            let first = (self.tick % period as u64) as usize;
+            if first == 0 {
+                self.execute_position_loops(psec, preview);
+            } else {
+                for (index, (axis, p)) in self.axes.iter_mut().zip(&self.parameters.axes).enumerate() {
+                    self.bank.set_load_torque(index, axis.apply_load(p));
+                }
+            }
+            let end = period.min(first + left);
+            self.bank.run_span(TickSpan { first, end, record_all: true });
+            self.tick += (end - first) as u64;
+            left -= end - first;
+        }
+        self.update_samples(0);
+    }
+
+    /// Returns the signals of an axis after the last tick: state of the motor, controller outputs of the last tick, and
+    /// friction, gravity and load over it. Of use after [`advance_ticks`](Self::advance_ticks).
+    ///
+    /// # Panics
+    /// Panics if the axis is out of range.
+    pub fn sample_at_end(&self, axis: usize) -> AxisSample {
+        let period = self.ticks_per_period() as u64;
+        let tick = ((self.tick + period - 1) % period) as usize;
+        self.axes[axis].sample_after(
+            &self.parameters.axes[axis],
+            tick,
+            &self.bank.state(axis),
+            &self.bank.record(axis, tick),
+        )
+    }
+
     /// Executes the position loops of all axes and sets the inputs to their inner loops.
     fn execute_position_loops(&mut self, psec: &[f64], preview: &[f64]) {
         let known = preview.len() / self.axes.len().max(1);
@@ -312,6 +357,11 @@ impl Machine {
                 self.bank.set_compensation(index, torque);
             }
         }
+    }
+
+    /// Returns true between two position cycles, false within one.
+    pub fn is_at_cycle_start(&self) -> bool {
+        self.tick.is_multiple_of(self.parameters.periods.ticks_per_position())
     }
 
     /// Returns the number of ticks per position cycle.

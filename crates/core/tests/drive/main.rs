@@ -4,5 +4,6 @@ mod analytic;
 mod drives;
 mod friction;
 mod parameter_ranges;
+mod partial_cycles;
 mod scalar_c;
 mod simd;
