@@ -1,0 +1,93 @@
+//! C interface: header, calls from a C program, bits against the library.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Arc;
+
+use virtual_axes_core::config::Parameters;
+use virtual_axes_core::machine::{Machine, MachineParameters};
+
+const AXES: usize = 5;
+const CYCLES: usize = 300;
+
+fn folder() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Returns the static library that cargo builds with this test.
+fn library() -> PathBuf {
+    let exe = std::env::current_exe().expect("the path of the test");
+    let deps = exe.parent().expect("a folder");
+    let named = |path: &PathBuf| {
+        path.file_name().is_some_and(|name| {
+            let name = name.to_string_lossy();
+            name.starts_with("libvirtual_axes_c") && name.ends_with(".a")
+        })
+    };
+    let files = deps.read_dir().expect("readable").filter_map(|entry| Some(entry.ok()?.path()));
+    let changed = |path: &PathBuf| path.metadata().and_then(|data| data.modified()).ok();
+    files.filter(named).max_by_key(changed).expect("cargo has built the static library")
+}
+
+/// Compiles a C program of this folder against the static library.
+fn compile(name: &str) -> PathBuf {
+    let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let mut gcc = Command::new("gcc");
+    gcc.args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-o"]).arg(&program);
+    gcc.arg("-I").arg(folder().join("include")).arg(folder().join("tests").join(format!("{name}.c")));
+    gcc.arg(library()).args(["-lpthread", "-ldl", "-lm"]);
+    assert!(gcc.status().expect("gcc is installed").success());
+    program
+}
+
+/// Returns the positions of the motion of smoke.c.
+fn positions() -> Vec<[f64; AXES]> {
+    let config = Parameters::builtin("mikron_ucp710").and_then(|p| p.machine_config()).expect("valid");
+    let mut machine = Machine::new(Arc::new(MachineParameters::new(&config).expect("can be discretized")));
+    let setpoint = |cycle: usize, axis: usize| {
+        (if axis < 3 { 0.01 } else { 0.2 }) * (if cycle < 150 { cycle as f64 / 150.0 } else { 1.0 })
+            / (axis + 1) as f64
+    };
+    let step = |cycle| {
+        machine.advance(&std::array::from_fn::<_, AXES, _>(|axis| setpoint(cycle, axis)), &[]);
+        std::array::from_fn(|axis| machine.motion_at_end(axis)[0])
+    };
+    (0..CYCLES).map(step).collect()
+}
+
+/// Parses a number as printed by `%a`.
+fn hexadecimal(text: &str) -> f64 {
+    let (sign, digits) = match text.strip_prefix('-') {
+        Some(digits) => (-1.0, digits),
+        None => (1.0, text),
+    };
+    let (mantissa, exponent) = digits.trim_start_matches("0x").split_once('p').expect("%a");
+    let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let value = u64::from_str_radix(&format!("{whole}{fraction}"), 16).expect("hexadecimal digits");
+    let exponent: i32 = exponent.parse().expect("an exponent");
+    sign * value as f64 * f64::powi(2.0, exponent - 4 * fraction.len() as i32)
+}
+
+#[test]
+fn a_c_program_gets_the_bits_of_the_library_and_an_error_for_each_bad_call() {
+    let output = Command::new(compile("smoke")).output().expect("it runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).expect("numbers");
+    let found: Vec<Vec<f64>> = text.lines().map(|line| line.split(' ').map(hexadecimal).collect()).collect();
+    assert_eq!(found.len(), CYCLES);
+    assert!(found.last().is_some_and(|row| row[0] > 0.009), "X arrives");
+    for (cycle, (found, wanted)) in found.iter().zip(positions()).enumerate() {
+        assert_eq!(found, &wanted, "cycle {cycle}");
+    }
+}
+
+#[test]
+fn the_header_is_that_of_the_source() {
+    let mut made = Vec::new();
+    cbindgen::generate(folder()).expect("the source can be read").write(&mut made);
+    let header = std::fs::read(folder().join("include/virtual_axes.h")).expect("it is in the repository");
+    assert!(
+        made == header,
+        "include/virtual_axes.h is out of date: cargo run -p virtual_axes_c --example header"
+    );
+}

@@ -1,0 +1,134 @@
+/* Calls of the C interface from C, as a user writes them: exit status 0 if all have the documented results.
+ *
+ * Run by interface.rs, and under valgrind and a sanitizer by tools/check_c_interface.sh. Prints the positions of a motion
+ * as hexadecimal numbers, one line per position cycle, which interface.rs compares with the library. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "virtual_axes.h"
+
+#define AXES 5
+#define CYCLES 300
+
+static int failures;
+
+#define CHECK(condition)                                                                     \
+  do {                                                                                       \
+    if (!(condition)) {                                                                      \
+      fprintf(stderr, "line %d: %s; last error: %s\n", __LINE__, #condition, va_last_error()); \
+      failures++;                                                                            \
+    }                                                                                        \
+  } while (0)
+
+static void setpoints(int cycle, double *psec) {
+  for (int axis = 0; axis < AXES; axis++) {
+    psec[axis] = (axis < 3 ? 0.01 : 0.2) * (cycle < 150 ? cycle / 150.0 : 1.0) / (axis + 1);
+  }
+}
+
+/* A bad call has its status and a text that contains `word`. */
+static void check_error(VaStatus found, VaStatus wanted, const char *word) {
+  CHECK(found == wanted);
+  CHECK(strstr(va_last_error(), word) != NULL);
+}
+
+static void bad_calls(VaMachine *machine) {
+  double values[AXES] = {0};
+  char text[64];
+  VaMachine *none = (VaMachine *)1;
+  VaSignals signals;
+
+  check_error(va_create(NULL, &none), VA_NULL_POINTER, "name");
+  CHECK(none == NULL);
+  check_error(va_create("mikron", &none), VA_INVALID, "mikron_ucp710");
+  CHECK(none == NULL);
+  check_error(va_create("mikron_ucp710", NULL), VA_NULL_POINTER, "machine");
+  check_error(va_create_from_text("x: [", "part.yaml", &none), VA_INVALID, "part.yaml");
+  check_error(va_create_from_text("\xff", "part.yaml", &none), VA_INVALID, "UTF-8");
+  check_error(va_step(NULL, values, AXES), VA_NULL_POINTER, "machine");
+  check_error(va_step(machine, NULL, AXES), VA_NULL_POINTER, "psec");
+  check_error(va_step(machine, values, AXES - 1), VA_INVALID, "it needs 5");
+  check_error(va_step_for_ns(machine, 1, values, AXES), VA_INVALID, "125000");
+  check_error(va_step_for_ns(machine, 0, values, AXES), VA_INVALID, "duration_ns");
+  check_error(va_step_for_ns(machine, UINT64_MAX - UINT64_MAX % 125000, values, AXES), VA_INVALID, "up to");
+  values[2] = NAN;
+  check_error(va_step(machine, values, AXES), VA_INVALID, "psec[2]");
+  check_error(va_set_loads(machine, values, AXES), VA_INVALID, "loads[2]");
+  check_error(va_reset(machine, values, AXES), VA_INVALID, "positions[2]");
+  check_error(va_set_preview(machine, NULL, 3), VA_NULL_POINTER, "preview");
+  check_error(va_set_preview(machine, values, SIZE_MAX), VA_INVALID, "cycles");
+  check_error(va_positions(machine, values, 4), VA_INVALID, "positions");
+  check_error(va_positions(machine, NULL, AXES), VA_NULL_POINTER, "positions");
+  check_error(va_signals(machine, AXES, &signals), VA_INVALID, "below 5");
+  check_error(va_signals(machine, 0, NULL), VA_NULL_POINTER, "signals");
+  check_error(va_set_parameter(machine, "x.position_loop.gian", "2"), VA_INVALID, "x.position_loop.gain");
+  check_error(va_set_parameter(machine, "x.position_loop.gain", "-2"), VA_INVALID, "x.position_loop.gain");
+  check_error(va_set_parameter(machine, "periods.position_ms", "3"), VA_INVALID, "periods");
+  check_error(va_parameter(machine, "x.position_loop.gain", text, 1), VA_INVALID, "size");
+  check_error(va_parameter(machine, "x.position_loop.gian", text, sizeof text), VA_INVALID, "unknown");
+  check_error(va_save(machine, NULL), VA_NULL_POINTER, "state");
+  check_error(va_restore(machine, NULL), VA_NULL_POINTER, "state");
+  CHECK(va_axis_count(NULL) == 0 && va_axis_name(NULL, 0) == NULL && va_axis_name(machine, AXES) == NULL);
+  CHECK(va_time_ns(NULL) == 0 && va_preview_length(NULL) == 0 && va_position_period_ns(NULL) == 0);
+  va_destroy(NULL);
+  va_destroy_state(NULL);
+}
+
+int main(void) {
+  VaMachine *machine = NULL;
+  CHECK(va_create("mikron_ucp710", &machine) == VA_OK);
+  if (!machine) return 1;
+  CHECK(strlen(va_version()) > 0);
+  CHECK(va_axis_count(machine) == AXES);
+  CHECK(strcmp(va_axis_name(machine, 3), "a") == 0);
+  CHECK(va_axis_is_rotary(machine, 3) && !va_axis_is_rotary(machine, 0));
+  CHECK(va_position_period_ns(machine) == 6000000 && va_current_period_ns(machine) == 125000);
+
+  double psec[AXES], position[AXES], other[AXES];
+  for (int cycle = 0; cycle < CYCLES; cycle++) {
+    setpoints(cycle, psec);
+    CHECK(va_step(machine, psec, AXES) == VA_OK);
+    CHECK(va_positions(machine, position, AXES) == VA_OK);
+    for (int axis = 0; axis < AXES; axis++) printf("%a%c", position[axis], axis + 1 < AXES ? ' ' : '\n');
+  }
+  CHECK(va_time_ns(machine) == CYCLES * va_position_period_ns(machine));
+  bad_calls(machine);
+
+  /* Nothing has changed. */
+  CHECK(va_positions(machine, other, AXES) == VA_OK);
+  CHECK(memcmp(position, other, sizeof position) == 0);
+
+  /* A saved state and the same steps, in parts of 0.5 ms. */
+  VaState *state = NULL;
+  CHECK(va_save(machine, &state) == VA_OK && state);
+  double loads[AXES] = {200, 0, 0, 5, 0};
+  psec[0] += 0.0001;
+  CHECK(va_set_loads(machine, loads, AXES) == VA_OK);
+  CHECK(va_set_parameter(machine, "x.position_loop.gain", "2") == VA_OK);
+  CHECK(va_step(machine, psec, AXES) == VA_OK);
+  CHECK(va_positions(machine, position, AXES) == VA_OK);
+  CHECK(va_restore(machine, state) == VA_OK);
+  char gain[32];
+  CHECK(va_parameter(machine, "x.position_loop.gain", gain, sizeof gain) == VA_OK && strcmp(gain, "2") != 0);
+  CHECK(va_set_loads(machine, loads, AXES) == VA_OK);
+  CHECK(va_set_parameter(machine, "x.position_loop.gain", "2") == VA_OK);
+  for (int part = 0; part < 12; part++) CHECK(va_step_for_ns(machine, 500000, psec, AXES) == VA_OK);
+  CHECK(va_positions(machine, other, AXES) == VA_OK);
+  CHECK(memcmp(position, other, sizeof position) == 0);
+
+  VaSignals signals;
+  CHECK(va_signals(machine, 0, &signals) == VA_OK);
+  CHECK(signals.position == other[0] && signals.psec == psec[0] && signals.load_current != 0);
+  double velocity[AXES], current[AXES];
+  CHECK(va_velocities(machine, velocity, AXES) == VA_OK && signals.velocity == velocity[0]);
+  CHECK(va_currents(machine, current, AXES) == VA_OK && signals.current == current[0]);
+
+  CHECK(va_reset(machine, NULL, 0) == VA_OK && va_time_ns(machine) == 0);
+  CHECK(va_positions(machine, position, AXES) == VA_OK && position[0] == 0);
+  va_destroy_state(state);
+  va_destroy(machine);
+  if (failures) fprintf(stderr, "%d failures\n", failures);
+  return failures != 0;
+}
