@@ -29,12 +29,12 @@ fn library() -> PathBuf {
     files.filter(named).max_by_key(changed).expect("cargo has built the static library")
 }
 
-/// Compiles a C program of this folder against the static library.
-fn compile(name: &str) -> PathBuf {
-    let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+/// Compiles a C program of this folder with further options against the static library.
+fn compile(source: &str, program: &str, options: &[&str]) -> PathBuf {
+    let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join(program);
     let mut gcc = Command::new("gcc");
-    gcc.args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-o"]).arg(&program);
-    gcc.arg("-I").arg(folder().join("include")).arg(folder().join("tests").join(format!("{name}.c")));
+    gcc.args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1"]).args(options).arg("-o").arg(&program);
+    gcc.arg("-I").arg(folder().join("include")).arg(folder().join("tests").join(source));
     gcc.arg(library()).args(["-lpthread", "-ldl", "-lm"]);
     assert!(gcc.status().expect("gcc is installed").success());
     program
@@ -70,7 +70,7 @@ fn hexadecimal(text: &str) -> f64 {
 
 #[test]
 fn a_c_program_gets_the_bits_of_the_library_and_an_error_for_each_bad_call() {
-    let output = Command::new(compile("smoke")).output().expect("it runs");
+    let output = Command::new(compile("smoke.c", "smoke", &[])).output().expect("it runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).expect("numbers");
     let found: Vec<Vec<f64>> = text.lines().map(|line| line.split(' ').map(hexadecimal).collect()).collect();
@@ -78,6 +78,28 @@ fn a_c_program_gets_the_bits_of_the_library_and_an_error_for_each_bad_call() {
     assert!(found.last().is_some_and(|row| row[0] > 0.009), "X arrives");
     for (cycle, (found, wanted)) in found.iter().zip(positions()).enumerate() {
         assert_eq!(found, &wanted, "cycle {cycle}");
+    }
+}
+
+/// Options of gcc that make leaks, invalid accesses and undefined behavior of a program an error.
+const SANITIZERS: [&str; 3] = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+
+#[test]
+fn sanitizers_find_no_leak_and_no_invalid_access() {
+    let output = Command::new(compile("smoke.c", "sanitized", &SANITIZERS)).output().expect("it runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn random_calls_in_any_order_return_a_status() {
+    let program = compile("random_calls.c", "random_calls", &SANITIZERS);
+    for seed in ["1", "2", "3"] {
+        let output = Command::new(&program).args([seed, "10000"]).output().expect("it runs");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success(), "seed {seed}: {}", String::from_utf8_lossy(&output.stderr));
+        // The calls reach the machines: many are valid.
+        let done: u32 = text.split(' ').next().and_then(|word| word.parse().ok()).expect("a number");
+        assert!(done > 3000, "{text}");
     }
 }
 

@@ -141,9 +141,11 @@ impl AxisBank {
         });
     }
 
-    /// Returns the record of an axis at a tick of the last position cycle.
+    /// Returns the record of an axis at a tick of the last position cycle, or at the last tick that was recorded.
     pub fn record(&self, axis: usize, tick: usize) -> TickRecord {
-        with_lane!(&self.blocks, axis, block_and_lane, |block, lane| block.records[tick].0.lane(lane))
+        with_lane!(&self.blocks, axis, block_and_lane, |block, lane| {
+            block.records[tick.min(block.records.len() - 1)].0.lane(lane)
+        })
     }
 
     /// Returns the statistics of an axis over the last position cycle.

@@ -326,13 +326,18 @@ impl Machine {
     }
 
     /// Returns the signals of an axis after the last tick: state of the motor, controller outputs of the last tick, and
-    /// friction, gravity and load over it. Of use after [`advance_ticks`](Self::advance_ticks).
+    /// friction, gravity and load over it.
+    ///
+    /// After [`advance`](Self::advance), which records one tick only, the controller outputs are those of the first tick.
     ///
     /// # Panics
     /// Panics if the axis is out of range.
     pub fn sample_at_end(&self, axis: usize) -> AxisSample {
+        if self.tick == 0 {
+            return *self.axes[axis].sample();
+        }
         let period = self.ticks_per_period() as u64;
-        let tick = ((self.tick + period - 1) % period) as usize;
+        let tick = ((self.tick - 1) % period) as usize;
         self.axes[axis].sample_after(
             &self.parameters.axes[axis],
             tick,
