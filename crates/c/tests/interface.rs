@@ -29,12 +29,12 @@ fn library() -> PathBuf {
     files.filter(named).max_by_key(changed).expect("cargo has built the static library")
 }
 
-/// Compiles a C program of this folder with further options against the static library.
+/// Compiles a C program of this crate with further options against the static library.
 fn compile(source: &str, program: &str, options: &[&str]) -> PathBuf {
     let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join(program);
     let mut gcc = Command::new("gcc");
     gcc.args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1"]).args(options).arg("-o").arg(&program);
-    gcc.arg("-I").arg(folder().join("include")).arg(folder().join("tests").join(source));
+    gcc.arg("-I").arg(folder().join("include")).arg(folder().join(source));
     gcc.arg(library()).args(["-lpthread", "-ldl", "-lm"]);
     assert!(gcc.status().expect("gcc is installed").success());
     program
@@ -70,7 +70,7 @@ fn hexadecimal(text: &str) -> f64 {
 
 #[test]
 fn a_c_program_gets_the_bits_of_the_library_and_an_error_for_each_bad_call() {
-    let output = Command::new(compile("smoke.c", "smoke", &[])).output().expect("it runs");
+    let output = Command::new(compile("tests/smoke.c", "smoke", &[])).output().expect("it runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).expect("numbers");
     let found: Vec<Vec<f64>> = text.lines().map(|line| line.split(' ').map(hexadecimal).collect()).collect();
@@ -86,13 +86,13 @@ const SANITIZERS: [&str; 3] = ["-g", "-fsanitize=address,undefined", "-fno-sanit
 
 #[test]
 fn sanitizers_find_no_leak_and_no_invalid_access() {
-    let output = Command::new(compile("smoke.c", "sanitized", &SANITIZERS)).output().expect("it runs");
+    let output = Command::new(compile("tests/smoke.c", "sanitized", &SANITIZERS)).output().expect("it runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]
 fn random_calls_in_any_order_return_a_status() {
-    let program = compile("random_calls.c", "random_calls", &SANITIZERS);
+    let program = compile("tests/random_calls.c", "random_calls", &SANITIZERS);
     for seed in ["1", "2", "3"] {
         let output = Command::new(&program).args([seed, "10000"]).output().expect("it runs");
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -101,6 +101,33 @@ fn random_calls_in_any_order_return_a_status() {
         let done: u32 = text.split(' ').next().and_then(|word| word.parse().ok()).expect("a number");
         assert!(done > 3000, "{text}");
     }
+}
+
+#[test]
+fn a_spring_computed_every_half_millisecond_has_the_position_of_the_library() {
+    let program = compile("examples/spring.c", "spring", &[]);
+    let output = Command::new(program).output().expect("it runs");
+    let config = Parameters::builtin("mikron_ucp710").and_then(|p| p.machine_config()).expect("valid");
+    let mut machine = Machine::new(Arc::new(MachineParameters::new(&config).expect("can be discretized")));
+    for _ in 0..2000 {
+        machine.set_load(0, -1e6 * machine.motion_at_end(0)[0]);
+        machine.advance_ticks(4, &[0.001, 0.0, 0.0, 0.0, 0.0], &[]);
+    }
+    let position = 1000.0 * machine.motion_at_end(0)[0];
+    assert_eq!(String::from_utf8_lossy(&output.stdout), format!("{position:.9} mm\n"));
+    // The loop has an integral part in the velocity loop only: a constant force of 1 kN leaves an error.
+    // The velocity controller has an integral part: after a second, no error is left under a constant force.
+    assert!((position - 1.0).abs() < 1e-9, "{position}");
+}
+
+#[test]
+fn the_page_shows_the_program() {
+    let page = std::fs::read_to_string(folder().join("../../docs/how-to/c-interface.md")).expect("a page");
+    let program = std::fs::read_to_string(folder().join("examples/spring.c")).expect("a program");
+    assert!(
+        page.contains(&format!("```c\n{program}```")),
+        "docs/how-to/c-interface.md shows another spring.c"
+    );
 }
 
 #[test]
