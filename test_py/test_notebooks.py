@@ -10,7 +10,10 @@ import pytest
 from nbclient import NotebookClient
 
 FOLDER = Path(__file__).resolve().parent.parent / "docs/notebooks"
+TRACES = FOLDER.parent / "tutorials/traces"
 PARAMETERS = {
+    "identify-from-a-trace": f'traces = Path({str(TRACES)!r})\naxis = "z"',
+    "tune-for-a-part": 'path = "corner-45"\ndesigns = 50\nmachines = 64',
     "sensitivity": "machines = 400\nworkers = 2",
     "residual-policy": 'seconds = 3\nmotion = "corner-90"',
 }
@@ -23,7 +26,7 @@ def executed(name: str, folder: Path) -> str:
         if "parameters" in cell.metadata.get("tags", []):
             cell.source = PARAMETERS[name]
     NotebookClient(
-        notebook, timeout=120, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
+        notebook, timeout=400, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
     ).execute()
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     texts = [output.get("text") or output.get("data", {}).get("text/plain", "") for output in outputs]
@@ -45,6 +48,25 @@ def test_the_predictive_controller_has_smaller_errors_and_margins(tmp_path: Path
     for row in ("contour error, max", "contour error, RMS", "modulus"):
         cascade, gpc = rows[row]
         assert cascade > gpc > 0, rows
+
+
+def test_the_identified_machine_has_inertia_and_weight_of_the_tutorial(tmp_path: Path) -> None:
+    text = executed("identify-from-a-trace", tmp_path)
+    tutorial = (FOLDER.parent / "tutorials/identify-from-a-trace.md").read_text(encoding="utf-8")
+    for key in ("z.motor.inertia_kg_m2", "z.gravity.weight_n"):
+        value = re.search(rf"^{re.escape(key)} +([\d.]+)", tutorial, re.MULTILINE)
+        assert value is not None
+        row = next(line for line in text.splitlines() if f" {key} " in line)
+        assert float(value[1]) in [float(word) for word in row.split() if re.fullmatch(r"[\d.]+", word)], row
+    assert "invalid: " not in text
+
+
+def test_a_tuning_has_smaller_errors_on_its_path(tmp_path: Path) -> None:
+    text = executed("tune-for-a-part", tmp_path)
+    row = re.search(r"^corner-45 +([\d.]+) +([\d.]+)$", text, re.MULTILINE)
+    assert row is not None and float(row[2]) < 0.1 * float(row[1]), text
+    median, largest = map(float, re.findall(r"([\d.]+) µm", text)[-2:])
+    assert float(row[2]) < median < largest
 
 
 def test_the_shares_of_a_sensitivity_study_add_up(tmp_path: Path) -> None:
