@@ -37,7 +37,9 @@ def on_terminal(arguments: list[object]) -> bytes:
     """Runs the command with standard error on a terminal of 100 columns and returns its output there."""
     here, there = pty.openpty()
     fcntl.ioctl(there, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))
-    with subprocess.Popen([COMMAND, *arguments], stdout=subprocess.DEVNULL, stderr=there) as process:
+    # Without TERM, a bar is never shown.
+    env = os.environ | {"TERM": "xterm"}
+    with subprocess.Popen([COMMAND, *arguments], stdout=subprocess.DEVNULL, stderr=there, env=env) as process:
         os.close(there)
         found = b""
         try:
