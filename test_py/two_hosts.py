@@ -180,8 +180,22 @@ def move(drive: AxesClient, points: int) -> None:
     times = [0.5 * index for index in range(points)]
     drive.accept(joint_trajectory(["y"], times, [[0.0]] * points), ACCEPTANCE_S)
     seconds = time.monotonic() - began
-    drive.stop(30.0)
+    stop(drive)
     write(seconds=seconds)
+
+
+def stop(drive: AxesClient) -> None:
+    """Stops the axes; repeats the request up to twice.
+
+    The node sends a response after a second even if it has not discovered the client's reader for it, which takes
+    longer if datagrams are lost. By the next request, it has.
+    """
+    for _ in range(2):
+        try:
+            return drive.stop(10.0)
+        except TimeoutError:
+            continue
+    drive.stop(10.0)
 
 
 def main() -> None:
