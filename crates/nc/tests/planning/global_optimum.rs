@@ -82,7 +82,6 @@ fn the_time_of_blended_corners_is_near_the_optimum() {
 }
 
 #[test]
-#[ignore = "takes a minute; the result is in docs/reference/part-programs.md"]
 fn the_time_of_a_raster_is_near_the_optimum() {
     check("raster", &raster(2, 0.03, 50e-6, 1e-6, 0.1, 10e-6), &fine_machine(), &FINE);
 }
