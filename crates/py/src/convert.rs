@@ -1,8 +1,12 @@
 //! Conversion of parameter values and errors between Python and the libraries.
 
 use std::error::Error;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
+use std::time::Duration;
 
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyList};
 use virtual_axes_core::config::{Assignment, Value, ValueSource};
@@ -15,6 +19,42 @@ pub fn value_error(error: impl Into<Box<dyn Error + Send + Sync>>) -> PyErr {
 /// Returns `KeyboardInterrupt` or another exception of a signal handler, if a signal has arrived.
 pub fn check_signals() -> Result<(), PyErr> {
     Python::attach(|py| py.check_signals())
+}
+
+/// Runs a long calculation without the global interpreter lock. A signal sets `stopped`, which the calculation reads, and
+/// its exception is returned.
+pub fn interruptible<T: Send>(
+    py: Python<'_>,
+    stopped: &AtomicBool,
+    run: impl FnOnce() -> PyResult<T> + Send,
+) -> PyResult<T> {
+    /// Interval between two looks at signals.
+    const POLL: Duration = Duration::from_millis(20);
+    py.detach(|| {
+        // Python runs signal handlers in this thread only.
+        thread::scope(|scope| {
+            let (running, ended) = mpsc::channel::<()>();
+            let worker = scope.spawn(move || {
+                let _running = running;
+                run()
+            });
+            let mut interrupt = None;
+            while ended.recv_timeout(POLL) == Err(RecvTimeoutError::Timeout) {
+                if let Err(error) = check_signals() {
+                    stopped.store(true, Ordering::Relaxed);
+                    interrupt = Some(error);
+                }
+            }
+            let found = worker.join().map_err(|_| PyRuntimeError::new_err("the calculation has failed"))?;
+            interrupt.map_or(found, Err)
+        })
+    })
+}
+
+/// Returns an error of input and output, which ends a calculation, if `stopped` is set.
+pub fn check_stopped(stopped: &AtomicBool) -> std::io::Result<()> {
+    let is_stopped = stopped.load(Ordering::Relaxed);
+    if is_stopped { Err(std::io::Error::other("interrupted")) } else { Ok(()) }
 }
 
 /// Converts a dictionary of parameters to assignments.
@@ -33,9 +73,9 @@ pub fn assignments(changes: &Bound<'_, PyDict>) -> PyResult<Vec<Assignment>> {
 }
 
 fn to_value(value: &Bound<'_, PyAny>) -> PyResult<Value> {
-    // A bool is an int in Python too.
-    if value.is_instance_of::<PyBool>() {
-        return Ok(Value::Bool(value.extract()?));
+    // A bool is an int in Python too; the extraction takes that of NumPy as well.
+    if let Ok(flag) = value.extract::<bool>() {
+        return Ok(Value::Bool(flag));
     }
     if let Ok(integer) = value.extract::<i64>() {
         return Ok(Value::Integer(integer));
@@ -46,8 +86,7 @@ fn to_value(value: &Bound<'_, PyAny>) -> PyResult<Value> {
     if let Ok(text) = value.extract::<String>() {
         return Ok(Value::Text(text));
     }
-    let is_flags =
-        value.try_iter()?.next().transpose()?.is_some_and(|first| first.is_instance_of::<PyBool>());
+    let is_flags = value.try_iter()?.next().transpose()?.is_some_and(|first| first.extract::<bool>().is_ok());
     if is_flags {
         return Ok(Value::BoolList(value.extract()?));
     }

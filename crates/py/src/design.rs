@@ -13,6 +13,12 @@ use virtual_axes_core::machine::{design_controller, prediction_model};
 use crate::convert::value_error;
 use crate::machine::PyMachine;
 
+/// Class that creates an object again, and its arguments.
+type Recreation<'py, T> = (Bound<'py, PyAny>, T);
+
+/// Arguments of a controller: R, S, T and the exponent of the first coefficient of T.
+type Coefficients = (Vec<f64>, Vec<f64>, Vec<f64>, i64);
+
 /// Discrete transfer function from Ω* to θ of an axis, `A(q⁻¹) θ = B(q⁻¹) Ω*`.
 #[pyclass(name = "PredictionModel", module = "virtual_axes_py._native", frozen)]
 pub struct PyPredictionModel {
@@ -98,6 +104,20 @@ impl PyPredictionModel {
     fn poles(&self, rst: &PyRst) -> PyResult<Vec<Complex64>> {
         design::poles(&self.model, &rst.rst).map_err(value_error)
     }
+
+    fn __eq__(&self, other: &PyPredictionModel) -> bool {
+        let (one, other) = (&self.model, &other.model);
+        one.a() == other.a() && one.b() == other.b() && one.period() == other.period()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("PredictionModel(a={:?}, b={:?}, period={:?})", self.a(), self.b(), self.period())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Recreation<'py, (Vec<f64>, Vec<f64>, f64)> {
+        let this = slf.get();
+        (slf.get_type().into_any(), (this.a(), this.b(), this.period()))
+    }
 }
 
 #[pymethods]
@@ -125,6 +145,20 @@ impl PyRst {
     #[getter]
     fn t_first(&self) -> i64 {
         self.rst.t_first()
+    }
+
+    fn __eq__(&self, other: &PyRst) -> bool {
+        let (one, other) = (&self.rst, &other.rst);
+        (one.r(), one.s(), one.t(), one.t_first()) == (other.r(), other.s(), other.t(), other.t_first())
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Rst(r={:?}, s={:?}, t={:?}, t_first={})", self.r(), self.s(), self.t(), self.t_first())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Recreation<'py, Coefficients> {
+        let this = slf.get();
+        (slf.get_type().into_any(), (this.r(), this.s(), this.t(), this.t_first()))
     }
 }
 

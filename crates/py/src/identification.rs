@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
@@ -15,7 +16,7 @@ use virtual_axes_identify::recording::{Conditioning, Finding, PsecShift, RawReco
 use virtual_axes_io::files::{Columns, RecordingOptions, read_recording};
 use virtual_axes_report::{IdentificationPage, ValidationRecording};
 
-use crate::convert::{check_signals, value_error};
+use crate::convert::{check_stopped, interruptible, value_error};
 use crate::machine::PyMachine;
 
 /// Recording as given by the caller.
@@ -176,7 +177,6 @@ fn conditioned(
 ) -> PyResult<Vec<ConditionedRecording>> {
     let mut found = Vec::new();
     for (source, mode) in sources.iter().zip(modes) {
-        check_signals()?;
         let of_file = |path: &Path| read_recording(path, axis, reading).map_err(value_error);
         let (raw, findings) = match source {
             Source::File(path) => &of_file(path)?,
@@ -231,16 +231,13 @@ pub fn identify(
     let chosen = IdentificationOptions { i0, refine: scope(options.refine.as_ref())? };
     let periods = machine.config.periods();
     let axis = (&machine.config.axes()[index], &periods);
-    let found = py.detach(|| {
+    let stopped = AtomicBool::new(false);
+    let found = interruptible(py, &stopped, || {
         let recordings = conditioned(&files, axis, reading, (&of_files, "feedforward"))?;
         let others = conditioned(&others, axis, reading, (&of_others, "validate_feedforward"))?;
-        let start = |_: &str| check_signals().map_err(std::io::Error::other);
-        AxisIdentification::new((&machine.parameters, index), recordings, others, &chosen, start).map_err(
-            |error| match check_signals() {
-                Err(interrupt) => interrupt,
-                Ok(()) => value_error(error),
-            },
-        )
+        let start = |_: &str| check_stopped(&stopped);
+        AxisIdentification::new((&machine.parameters, index), recordings, others, &chosen, start)
+            .map_err(value_error)
     })?;
     Ok(PyIdentification { found, periods })
 }

@@ -17,7 +17,7 @@ use crate::convert::{check_signals, value_error};
 use crate::machine::PyMachine;
 
 /// Rows between two looks at signals.
-const ROWS_PER_CHECK: usize = 10_000;
+const ROWS_PER_CHECK: usize = 500;
 
 /// Function that creates an object again, and its arguments: a name and an option.
 type Recreation<'py, T> = (Bound<'py, PyAny>, (String, T));

@@ -108,15 +108,21 @@ impl Stepper {
         let preview = match &preview {
             None => Vec::new(),
             Some(array) => {
-                let axes = self.machine.axis_count();
                 let (shape, values) = (array.shape(), array.as_array());
-                let periods = shape.last().copied().unwrap_or(0);
-                if values.len() != axes * periods || values.iter().any(|value| !value.is_finite()) {
-                    let reason = format!(
-                        "preview has the shape {shape:?}; it needs finite values, the following setpoints of {axes} axes, \
-                         axis by axis"
-                    );
-                    return Err(value_error(reason));
+                let is_fitting = match *shape {
+                    [rows, _] => rows == self.machine.axis_count(),
+                    [machines, axes, _] => (machines, axes) == (self.machines, self.axes),
+                    _ => false,
+                };
+                if !is_fitting {
+                    let needed = match self.machines {
+                        1 => format!("({}, cycles)", self.axes),
+                        machines => format!("({machines}, {}, cycles)", self.axes),
+                    };
+                    return Err(value_error(format!("preview has the shape {shape:?}; it needs {needed}")));
+                }
+                if let Some(value) = values.iter().find(|value| !value.is_finite()) {
+                    return Err(value_error(format!("preview has the value {value}; it must be finite")));
                 }
                 values.iter().copied().collect()
             }

@@ -1,7 +1,6 @@
 //! Simulation of many variants of a machine on the same setpoints.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -11,12 +10,14 @@ use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::trial::{self, Figures, GridRows, Measures, SetpointSource, Trial, TrialError};
 use virtual_axes_io::files::figures_json;
 
-use crate::convert::{check_signals, value_error};
+use crate::convert::{check_stopped, interruptible, value_error};
 use crate::machine::PyMachine;
 use crate::simulate::{Given, Prepared, measures};
 
 /// Variants simulated as the lanes of one machine.
 const BATCH: usize = 32;
+/// Largest number of threads.
+const MOST_THREADS: usize = 1024;
 
 /// Figures of a variant, or the reason why it cannot be simulated.
 type Outcome = Result<Figures, String>;
@@ -64,10 +65,7 @@ impl Sweep<'_> {
     }
 
     fn run(&self, batch: &[MachineConfig]) -> Vec<Outcome> {
-        let go_on = || {
-            let is_stopped = self.stopped.load(Ordering::Relaxed);
-            if is_stopped { Err(std::io::Error::other("interrupted")) } else { Ok(()) }
-        };
+        let go_on = || check_stopped(self.stopped);
         if let Some(own) = self.own_axes(batch).filter(|own| !own.is_empty()) {
             let trial = self.trial(&self.base.config);
             if let Ok(figures) = trial::run_variants(&trial, self.setpoints(), batch, &own, go_on) {
@@ -105,6 +103,9 @@ pub fn sweep<'py>(
     threads: usize,
 ) -> PyResult<Vec<SweepRow>> {
     let measures = measures(figures)?;
+    if !(1..=MOST_THREADS).contains(&threads) {
+        return Err(value_error(format!("threads {threads}: must be from 1 to {MOST_THREADS}")));
+    }
     let prepared = psec.prepare(py, base)?;
     let configs: Vec<Result<MachineConfig, String>> = variants
         .iter()
@@ -117,23 +118,18 @@ pub fn sweep<'py>(
             Err(error) => Err(error),
         })
         .collect::<PyResult<_>>()?;
-    let stopped = Arc::new(AtomicBool::new(false));
+    let stopped = AtomicBool::new(false);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
         .map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
-    let outcomes = py.detach(|| {
+    let outcomes = interruptible(py, &stopped, || {
         let sweep = Sweep { base, prepared: &prepared, measures, stopped: &stopped };
         let valid: Vec<MachineConfig> =
             configs.iter().filter_map(|config| config.as_ref().ok().cloned()).collect();
         let batches: Vec<&[MachineConfig]> = valid.chunks(BATCH).collect();
-        let mut found = Vec::with_capacity(valid.len());
-        for group in batches.chunks(4 * pool.current_num_threads()) {
-            found.extend(
-                pool.install(|| group.par_iter().flat_map_iter(|batch| sweep.run(batch)).collect::<Vec<_>>()),
-            );
-            check_signals()?;
-        }
+        let found: Vec<Outcome> =
+            pool.install(|| batches.par_iter().flat_map_iter(|batch| sweep.run(batch)).collect());
         let mut found = found.into_iter();
         let of_variant = |config: &Result<MachineConfig, String>| match config {
             Ok(_) => found.next().unwrap_or_else(|| Err("not simulated".to_owned())),

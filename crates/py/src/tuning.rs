@@ -1,11 +1,8 @@
 //! Tuning of controllers for a path.
 
 use std::io;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
-use std::time::Duration;
+use std::sync::atomic::AtomicBool;
 
-use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use serde_json::Value;
 use virtual_axes_core::trial::{GridRows, SetpointSource};
@@ -15,12 +12,9 @@ use virtual_axes_identify::tune::{
 };
 use virtual_axes_io::files::tuning_json;
 
-use crate::convert::{check_signals, value_error};
+use crate::convert::{check_stopped, interruptible, value_error};
 use crate::machine::PyMachine;
 use crate::simulate::Given;
-
-/// Interval between two looks at signals.
-const POLL: Duration = Duration::from_millis(20);
 
 /// Path with its name and description.
 type NamedPath<'py> = (String, String, Given<'py>);
@@ -69,8 +63,7 @@ struct StopFlag<'a>(&'a AtomicBool);
 
 impl Progress for StopFlag<'_> {
     fn check_interrupt(&self) -> io::Result<()> {
-        let is_stopped = self.0.load(Ordering::Relaxed);
-        if is_stopped { Err(io::Error::other("interrupted")) } else { Ok(()) }
+        check_stopped(self.0)
     }
 }
 
@@ -115,23 +108,5 @@ pub fn tune(
         let tuned = found.best.tuning.apply(problem.parameters(), problem.joints()).map_err(value_error)?;
         Ok((Value::Object(json).to_string(), PyMachine::new(tuned)?))
     };
-    py.detach(|| {
-        // Signals arrive in this thread only.
-        thread::scope(|scope| {
-            let worker = scope.spawn(run);
-            let mut interrupt = None;
-            while !worker.is_finished() {
-                if let Err(error) = check_signals() {
-                    stopped.store(true, Ordering::Relaxed);
-                    interrupt = Some(error);
-                }
-                thread::sleep(POLL);
-            }
-            let found = worker.join().map_err(|_| PyRuntimeError::new_err("the search has failed"))?;
-            match interrupt {
-                Some(error) => Err(error),
-                None => found,
-            }
-        })
-    })
+    interruptible(py, &stopped, run)
 }

@@ -30,7 +30,7 @@ pub fn find_contrasts(
     limits: &MarginLimits,
 ) -> Result<(TuningCandidate, Vec<Contrast>), TuneError> {
     let present = problem.run_on(other, &Tuning::Present)?;
-    let designs = within_limits(problem.designs(design_grid()), limits);
+    let designs = within_limits(problem.designs(design_grid())?, limits);
     let is_better = |candidate: &TuningCandidate| candidate.cost < problem.present().cost;
     let is_worse = |candidate: &TuningCandidate| candidate.cost > present.cost;
     // The shorter path is run first, which reduces the runs on the longer one.

@@ -86,7 +86,7 @@ pub fn tune_gpc_from(
     first.extend(preset(problem).filter(|preset| !first.contains(preset)));
     let mut seen: HashSet<Key> = first.iter().filter_map(key).collect();
     let mut designs = first.len();
-    let all = problem.designs(first);
+    let all = problem.designs(first)?;
     let closest =
         all.iter().filter_map(|(_, margins)| *margins).max_by(|a, b| a.modulus.total_cmp(&b.modulus));
     let kept = within_limits(all, limits);
@@ -110,7 +110,7 @@ pub fn tune_gpc_from(
             .filter(|tuning| key(tuning).is_some_and(|key| seen.insert(key)))
             .collect();
         designs += around.len();
-        let kept = within_limits(problem.designs(around), limits);
+        let kept = within_limits(problem.designs(around)?, limits);
         runs += kept.len();
         tried.extend(problem.runs("refinement", kept)?);
         tried = keep_cheapest(tried);

@@ -12,7 +12,7 @@ use virtual_axes_core::config::{AxisConfig, MachineConfig, Parameters};
 use virtual_axes_core::control::Rst;
 use virtual_axes_core::design::{DesignError, Margins, PredictionModel, gpc};
 use virtual_axes_core::machine::{MachineError, design_controller, prediction_model};
-use virtual_axes_core::trial::{Figures, TrialOutcome};
+use virtual_axes_core::trial::{Figures, TrialError, TrialOutcome};
 use virtual_axes_core::units::POSITION_GAIN;
 
 /// Tunings simulated side by side: enough to fill SIMD vectors, few enough for the caches.
@@ -205,10 +205,11 @@ impl<'a> TuningProblem<'a> {
     }
 
     /// Computes the margins of `tunings` in parallel.
-    pub(super) fn designs(&self, tunings: Vec<Tuning>) -> Vec<(Tuning, Option<Margins>)> {
+    pub(super) fn designs(&self, tunings: Vec<Tuning>) -> Result<Vec<(Tuning, Option<Margins>)>, TuneError> {
         let with_margins = |tuning: Tuning| {
+            self.progress.check_interrupt().map_err(TrialError::Callback)?;
             let margins = self.margins(&tuning);
-            (tuning, margins)
+            Ok((tuning, margins))
         };
         tunings.into_par_iter().map(with_margins).collect()
     }

@@ -73,8 +73,11 @@ def run(
 
 
 def thread_count(client: Client) -> int:
-    """Returns the number of threads of all workers."""
-    return sum(client.nthreads().values())
+    """Returns the number of threads of all workers; raises `TypeError` for anything but a client of Dask."""
+    if not isinstance(client, distributed.Client):
+        raise TypeError(f"executor is of type {type(client).__name__}; it must be a distributed.Client")
+    threads: dict[str, int] = client.nthreads()  # type: ignore[no-untyped-call]
+    return sum(threads.values())
 
 
 def measure(client: Client, setup: Setup, variants: Variants, repetitions: int = 3) -> Overhead:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ._native import PredictionModel, Rst
+from .arguments import to_native, to_whole
 from .machine import Machine
 
 if TYPE_CHECKING:
@@ -57,12 +58,12 @@ def model(machine: Machine, axis: str) -> PredictionModel:
 
     Raises `ValueError` for an unknown axis or inner loops that are unstable.
     """
-    return machine.native.prediction_model(axis)
+    return to_native(machine).prediction_model(axis)
 
 
 def of_machine(machine: Machine, axis: str) -> Rst:
     """Returns the position controller of an axis as the machine file has it, in RST form."""
-    return machine.native.controller(axis)
+    return to_native(machine).controller(axis)
 
 
 def rst(r: Sequence[float], s: Sequence[float], t: Sequence[float], t_first: int = 0) -> Rst:
@@ -92,6 +93,7 @@ def gpc(
         raise ValueError("give either lambda_rel or lambda_")
     weight = lambda_rel if lambda_rel is not None else lambda_
     assert weight is not None
+    n1, n2, nu = (to_whole(name, value, 0, 10**9) for name, value in (("n1", n1), ("n2", n2), ("nu", nu)))
     return model.gpc(n1, n2, nu, weight, lambda_rel is not None)
 
 

@@ -9,9 +9,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import _native
+from .arguments import to_floats, to_native
 from .machine import Machine
 
 if TYPE_CHECKING:
@@ -126,7 +127,7 @@ def identify(
         "refine": None if refine is None else list(refine),
         "free_i0": free_i0,
     }
-    native = (machine if machine is not None else Machine.load()).native
+    native = to_native(machine if machine is not None else Machine.load())
     return Identification(_native.identify(native, axis, _sources(recordings), _sources(validate), options))
 
 
@@ -136,7 +137,15 @@ def _sources(given: Recording | Sequence[Recording]) -> list[str | dict[str, Any
     found: list[str | dict[str, Any]] = []
     for one in several:
         if isinstance(one, Mapping):
-            found.append({name: np.ascontiguousarray(values, dtype=np.float64) for name, values in one.items()})
+            found.append({name: _channel(name, values) for name, values in one.items()})
         else:
             found.append(os.fspath(one))
     return found
+
+
+def _channel(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Returns the values of a channel; raises `ValueError` unless they have one dimension."""
+    channel = to_floats(f"channel {name}", values)
+    if channel.ndim != 1:
+        raise ValueError(f"channel {name} has the shape {channel.shape}; it needs one dimension")
+    return channel

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
+from .arguments import to_floats
 from .run import Run
 
 if TYPE_CHECKING:
@@ -131,30 +132,52 @@ class Machine:
         `signals` are those of `SIGNALS` to record, at every position cycle, or with `every_tick` at every current
         cycle. `figures` is `all`, `contour` (all but circles) or `axes`, which is the fastest.
 
-        Raises `ValueError` for setpoints of another shape or that the machine rejects, with time, axis and limit.
+        Raises `ValueError` for setpoints of another shape or that the machine rejects, with time, axis and limit;
+        `TypeError` for anything but real numbers.
         """
         given = self.setpoints(psec)
+        if isinstance(signals, str):
+            raise TypeError(f"signals is {signals!r}; it must be a list of names")
         table, text, count = self._native.simulate(given, list(signals), every_tick, figures)
         return Run(self, table.pop("time"), table, json.loads(text), count, given)
 
     def setpoints(self, psec: Setpoints) -> NDArray[np.float64] | _native.Scenario | _native.PartProgram:
         """Returns setpoints as an array (setpoints, axes), m or rad; scenarios and part programs as they are.
 
-        Raises `ValueError` for an unknown axis or columns of different lengths.
+        Raises `ValueError` for an unknown axis, another shape or a value that is not finite; `TypeError` for anything
+        but real numbers.
         """
         if isinstance(psec, _native.Scenario | _native.PartProgram):
             return psec
         if not isinstance(psec, Mapping):
-            return np.asarray(psec, dtype=np.float64)
+            if isinstance(psec, str):
+                raise TypeError(f"psec is {psec!r}; a scenario is scenario(name), a part program nc_program(path)")
+            return self._checked(to_floats("psec", psec))
         unknown = [name for name in psec if name not in self.axes]
         if unknown:
             raise ValueError(f"axis {unknown[0]!r} is unknown; known are {', '.join(self.axes)}")
-        columns = {name: np.asarray(values, dtype=np.float64) for name, values in psec.items()}
+        columns = {name: to_floats(f"psec of {name}", values) for name, values in psec.items()}
         shapes = {column.shape for column in columns.values()}
         if len(shapes) != 1 or len(next(iter(shapes))) != 1:
             raise ValueError(f"the columns of psec have the shapes {sorted(shapes)}; they need one common length")
         still = np.zeros(next(iter(shapes)))
-        return np.column_stack([columns.get(name, still) for name in self.axes])
+        return self._checked(np.column_stack([columns.get(name, still) for name in self.axes]))
+
+    def _checked(self, psec: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Returns setpoints of a fitting shape with finite values."""
+        axes = self.axes
+        if psec.ndim != 2:
+            raise ValueError(f"psec has the shape {psec.shape}; it needs (setpoints, {len(axes)})")
+        if psec.shape[1] != len(axes):
+            raise ValueError(f"psec has {psec.shape[1]} columns; it needs one per axis: {', '.join(axes)}")
+        if len(psec) == 0:
+            raise ValueError("psec has no setpoints; it needs at least one row")
+        if not np.isfinite(psec).all():
+            row, column = np.argwhere(~np.isfinite(psec))[0]
+            value = str(psec[row, column]).replace("nan", "NaN")
+            time = row * self.position_period
+            raise ValueError(f"at {time:.6g} s: {axes[column]}: position is {value}, not a finite number")
+        return psec
 
     def __eq__(self, other: object) -> bool:
         """Returns true for a machine with equal parameters."""

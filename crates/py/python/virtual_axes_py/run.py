@@ -49,12 +49,19 @@ class Run:
     @property
     def following_error(self) -> NDArray[np.float64]:
         """Following error `PSEC − position`, which contains the delay α, m or rad."""
-        return self.signals["psec"] - self.signals["position"]
+        return self._difference("psec")
 
     @property
     def delay_compensated_following_error(self) -> NDArray[np.float64]:
         """Following error with the setpoint at the input of the position controller, m or rad."""
-        return self.signals["delayed_psec"] - self.signals["position"]
+        return self._difference("delayed_psec")
+
+    def _difference(self, setpoint: str) -> NDArray[np.float64]:
+        """Returns a setpoint less the position; raises `ValueError` unless both are recorded."""
+        missing = [name for name in (setpoint, "position") if name not in self.signals]
+        if missing:
+            raise ValueError(f"signal {missing[0]!r} is not recorded; recorded are {', '.join(self.signals)}")
+        return self.signals[setpoint] - self.signals["position"]
 
     def axis(self, name: str) -> dict[str, NDArray[np.float64]]:
         """Returns the signals of one axis by name; raises `ValueError` for an unknown axis."""

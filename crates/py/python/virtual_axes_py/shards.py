@@ -125,6 +125,8 @@ class Store:
 
 def _read(file: Path) -> dict[str, Any]:
     """Returns the identity of the study in a file."""
+    if not file.exists():
+        raise ValueError(f"{file.parent} has no study; it needs the file {file.name}, which sweep writes")
     try:
         found = json.loads(file.read_text())
         int(found["chunk"]), int(found["rows"])

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
+from .arguments import to_native, to_whole
 from .machine import Machine
 
 
@@ -28,14 +29,14 @@ class Stepper:
 
     def __init__(self, machine: Machine, machines: int = 1) -> None:
         """Creates machines at rest at home, 0 on every axis; raises `ValueError` unless there are 1 to 100,000."""
-        self._native = _native.Stepper(machine.native, machines)
+        self._native = _native.Stepper(to_native(machine), to_whole("machines", machines, 1, 100_000))
 
     def step(self, psec: ArrayLike, preview: ArrayLike | None = None) -> NDArray[np.float64]:
         """Advances by one position cycle and returns the positions at its end, m or rad.
 
-        `psec` are the setpoints of the cycle, m or rad. `preview` are the following setpoints, (axes, cycles), which
-        predictive controllers read; beyond it they see the last one. Raises `ValueError` for another shape or a value
-        that is not finite.
+        `psec` are the setpoints of the cycle, m or rad. `preview` are the following setpoints, (axes, cycles) or of
+        several machines (machines, axes, cycles), which predictive controllers read; beyond it they see the last one.
+        Raises `ValueError` for another shape or a value that is not finite.
         """
         ahead = None if preview is None else np.asarray(preview, dtype=np.float64)
         return self._native.step(np.asarray(psec, dtype=np.float64), ahead)
@@ -47,7 +48,8 @@ class Stepper:
         `ValueError` for an array of another shape or an index out of range.
         """
         given = None if position is None else np.asarray(position, dtype=np.float64)
-        self._native.reset(given, None if only is None else list(only))
+        last = self.machines - 1
+        self._native.reset(given, None if only is None else [to_whole("machine", one, 0, last) for one in only])
 
     def set_load(self, load: ArrayLike) -> None:
         """Sets the external loads from the next cycle on, N or N·m, positive towards plus."""
@@ -66,7 +68,7 @@ class Stepper:
 
         Raises `ValueError` for a machine with other periods or another number of axes.
         """
-        self._native.set_machine(machine.native)
+        self._native.set_machine(to_native(machine))
 
     def save(self) -> _native.StepperState:
         """Returns a copy of the state for `restore`."""

@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
-from . import chunks, shards
+from . import _native, chunks, shards
+from .arguments import to_native, to_whole
 from .chunks import Setup, SweepResult
 from .machine import Machine
 
@@ -23,12 +25,20 @@ if TYPE_CHECKING:
 
 BATCH = 32
 """Variants that run side by side as vector lanes."""
+MOST_THREADS = 1024
+"""Largest number of threads."""
+MOST_VARIANTS = 1_000_000_000
+"""Largest number of variants in a chunk, and of jobs."""
 CHUNK = 4096
 """Most variants in a chunk."""
 SHARE = 0.02
 """Largest overhead of a chunk as a part of its duration."""
 SCHEDULER_SHARE = 0.5
 """Largest overhead of the chunks of all workers as a part of their duration."""
+
+
+LARGEST_BOUND = 1e18
+"""Largest amount of a bound of drawn parameters."""
 
 
 class SweepResults(Sequence[SweepResult]):
@@ -85,7 +95,7 @@ class RandomVariants(Sequence[Mapping[str, "Parameter"]]):
         random = np.random.default_rng([self.seed, position])
 
         def draw(low: float, high: float) -> float:
-            if isinstance(low, int) and isinstance(high, int):
+            if isinstance(low, int | np.integer) and isinstance(high, int | np.integer):
                 return int(random.integers(low, high, endpoint=True))
             return float(random.uniform(low, high))
 
@@ -98,11 +108,14 @@ def random_variants(seed: int, n: int, bounds: Mapping[str, tuple[float, float]]
     `bounds` are the lowest and highest value of each parameter; two integers draw integers. Variant i depends on
     `seed`, `bounds` and i only. Raises `ValueError` for a negative seed or number, or bounds in the wrong order.
     """
-    if seed < 0 or n < 0:
-        raise ValueError(f"seed {seed}, n {n}: must be at least 0")
-    for name, (low, high) in bounds.items():
-        if not (np.isfinite([low, high]).all() and low <= high):
-            raise ValueError(f"{name}: bounds ({low}, {high}) must be finite, the lower one first")
+    seed, n = to_whole("seed", seed, 0, 2**64 - 1), to_whole("n", n, 0, MOST_VARIANTS)
+    for name, pair in bounds.items():
+        if len(pair) != 2 or not all(isinstance(value, int | float | np.integer | np.floating) for value in pair):
+            raise TypeError(f"{name}: bounds {pair!r} must be two numbers, the lower one first")
+        low, high = pair
+        if not (abs(low) <= LARGEST_BOUND and abs(high) <= LARGEST_BOUND and low <= high):
+            most = f"at most {LARGEST_BOUND:g} in amount"
+            raise ValueError(f"{name}: bounds ({low}, {high}) must be finite, {most}, the lower one first")
     return RandomVariants(seed, {name: (low, high) for name, (low, high) in bounds.items()}, 0, n)
 
 
@@ -172,17 +185,16 @@ def sweep(
     Raises `TypeError` for a parameter of another kind, `ValueError` for invalid setpoints and options, and for a
     directory with another study, naming what differs.
     """
-    if threads is not None and threads < 1:
-        raise ValueError(f"threads {threads}: must be at least 1")
-    if chunk is not None and chunk < 1:
-        raise ValueError(f"chunk {chunk}: must be at least 1")
+    to_native(machine)
+    if threads is not None:
+        threads = to_whole("threads", threads, 1, MOST_THREADS)
+    if chunk is not None:
+        chunk = to_whole("chunk", chunk, 1, MOST_VARIANTS)
     if out is None and (resume or shard is not None):
         raise ValueError("resume and shard need a directory as out")
-    index, count = (0, 1) if shard is None else shard
-    if not 0 <= index < count:
-        raise ValueError(f"shard ({index}, {count}): the first number must be from 0 to below the second")
-    rows = variants if isinstance(variants, RandomVariants) else list(variants)
-    setup = Setup(machine, machine.setpoints(psec), figures, _threads(threads, executor))
+    index, count = (0, 1) if shard is None else _shard(shard)
+    rows = variants if isinstance(variants, RandomVariants) else _dictionaries(variants)
+    setup = Setup(machine, _planned(machine, psec), figures, _threads(threads, executor))
     store = None if out is None else shards.Store(Path(out))
     size = chunk or (store.chunk() if store else None) or _chunk_size(setup, rows, executor, count)
     if store:
@@ -203,6 +215,34 @@ def sweep(
         return store.directory
     results = (SweepResult.of(*one) for first, end in parts for one in zip(rows[first:end], found.pop(first)))
     return SweepResults(list(results))
+
+
+def _shard(shard: tuple[int, int]) -> tuple[int, int]:
+    """Returns a checked shard."""
+    if len(shard) != 2:
+        raise ValueError(f"shard {shard}: must be two numbers, the job and the number of jobs")
+    count = to_whole("shard, number of jobs", shard[1], 1, MOST_VARIANTS)
+    return to_whole("shard, job", shard[0], 0, count - 1), count
+
+
+def _dictionaries(variants: Sequence[Mapping[str, Parameter]]) -> list[Mapping[str, Parameter]]:
+    """Returns the variants as a list; raises `TypeError` for anything but dictionaries."""
+    if isinstance(variants, Mapping):
+        raise TypeError("variants is a dictionary; it must be a sequence of dictionaries of changed parameters")
+    rows = list(variants)
+    for index, row in enumerate(rows):
+        if not isinstance(row, Mapping):
+            raise TypeError(f"variant {index} is of type {type(row).__name__}; it must be a dictionary")
+    return rows
+
+
+def _planned(machine: Machine, psec: Setpoints) -> NDArray[np.float64] | _native.Scenario | _native.PartProgram:
+    """Returns setpoints; those of a part program planned once, so that workers need no file."""
+    given = machine.setpoints(psec)
+    if isinstance(given, _native.PartProgram):
+        rows = given.psec(machine)
+        return rows if rows.shape[1] == len(machine.axes) else given
+    return given
 
 
 def _threads(threads: int | None, executor: Client | None) -> int:

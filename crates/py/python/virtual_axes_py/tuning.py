@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _native
+from .arguments import to_native
 from .machine import Machine
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ def tune(
         "designs": designs,
     }
     paths = [_named(machine, one, f"path {index + 1}") for index, one in enumerate([psec, *also])]
-    text, tuned = _native.tune(machine.native, paths[0], paths[1:], options)
+    text, tuned = _native.tune(to_native(machine), paths[0], paths[1:], options)
     return TuningResult(Machine(tuned), json.loads(text))
 
 

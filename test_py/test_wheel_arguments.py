@@ -1,0 +1,198 @@
+"""Module `virtual_axes_py`: wrong arguments, interruptions, threads and processes."""
+
+from __future__ import annotations
+
+import multiprocessing
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import virtual_axes_py as va
+
+STILL = np.zeros((5, 5))
+
+
+@pytest.fixture(scope="module")
+def machine() -> va.Machine:
+    """Returns the default machine."""
+    return va.Machine.load()
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "text"),
+    [
+        (lambda m: m.simulate(None), TypeError, "elements of type object; it must have real numbers"),
+        (lambda m: m.simulate("ballbar"), TypeError, r"psec is 'ballbar'; a scenario is scenario\(name\)"),
+        (lambda m: m.simulate(np.zeros(5)), ValueError, r"shape \(5,\); it needs \(setpoints, 5\)"),
+        (lambda m: m.simulate(np.zeros((2, 3, 5))), ValueError, r"shape \(2, 3, 5\)"),
+        (lambda m: m.simulate(0.0), ValueError, r"shape \(\)"),
+        (lambda m: m.simulate(STILL.astype(complex)), TypeError, "complex128"),
+        (lambda m: m.simulate([[0.0, 0.0], [0.0]]), ValueError, "rows of different lengths"),
+        (lambda m: m.simulate({"x": ["a", "b"]}), TypeError, "psec of x"),
+        (lambda m: m.simulate(STILL, signals="position"), TypeError, "signals is 'position'"),
+        (lambda m: m.simulate(STILL, signals=["psec"]).following_error, ValueError, "'position' is not recorded"),
+        (lambda m: va.Stepper("axes"), TypeError, "machine is of type str"),
+        (lambda m: va.Stepper(m, -1), ValueError, "machines -1: must be from 1 to 100000"),
+        (lambda m: va.Stepper(m, 10**20), ValueError, "machines 1000"),
+        (lambda m: va.Stepper(m, 1.5), TypeError, "machines 1.5: must be an integer"),
+        (lambda m: va.Stepper(m, 2).reset(only=[-1]), ValueError, "machine -1: must be from 0 to 1"),
+        (lambda m: va.Stepper(m).step(np.zeros(5), np.zeros((3, 4))), ValueError, r"it needs \(5, cycles\)"),
+        (lambda m: va.Stepper(m, 3).step(np.zeros((3, 5)), np.zeros((5, 3, 4))), ValueError, r"\(3, 5, cycles\)"),
+        (lambda m: va.Stepper(m).step(np.zeros(5), np.full((5, 2), np.nan)), ValueError, "preview has the value NaN"),
+        (lambda m: va.Stepper(m).set_machine(3), TypeError, "machine is of type int"),
+        (lambda m: va.design.gpc(va.design.model(m, "x"), -1, lambda_rel=0.1), ValueError, "n2 -1"),
+        (lambda m: va.identify({"time": np.zeros((3, 3))}, "x", m), ValueError, r"channel time has the shape \(3, 3\)"),
+        (lambda m: va.sweep(m, [{}], STILL, threads=10**7), ValueError, "threads 10000000: must be from 1 to 1024"),
+        (lambda m: va.sweep(m, [{}], STILL, threads=1.5), TypeError, "threads 1.5"),
+        (lambda m: va.sweep(m, [{}], STILL, chunk="a"), TypeError, "chunk 'a'"),
+        (lambda m: va.sweep(m, [{}], STILL, executor=3), TypeError, "executor is of type int"),
+        (lambda m: va.sweep(m, {"x.position_loop.gain": 1.0}, STILL), TypeError, "variants is a dictionary"),
+        (lambda m: va.sweep(m, ["abc"], STILL), TypeError, "variant 0 is of type str"),
+        (
+            lambda m: va.sweep(m, [{}], np.full((3, 5), np.nan)),
+            ValueError,
+            "at 0 s: x: position is NaN, not a finite number",
+        ),
+        (lambda m: va.sweep(m, [{}], STILL, out="nowhere", shard=(0, 1, 2)), ValueError, "must be two numbers"),
+        (lambda m: va.merge("/nowhere"), ValueError, "/nowhere has no study"),
+        (lambda m: va.random_variants(1, 1, {"x.position_loop.gain": ("a", "b")}), TypeError, "must be two numbers"),
+        (lambda m: va.random_variants(1, 1, {"x.position_loop.gain": (0, 10**30)}), ValueError, "1e.18 in amount"),
+        (lambda m: va.random_variants(1, 1.5, {}), TypeError, "n 1.5"),
+    ],
+)
+def test_a_wrong_argument_is_named(call, error, text: str, machine: va.Machine) -> None:
+    with pytest.raises(error, match=text):
+        call(machine)
+
+
+def test_values_of_numpy_are_values_of_python(machine: va.Machine) -> None:
+    changes = {
+        "x.position_loop.gain": np.float32(1.5),
+        "allow_nonzero_velocity_at_trajectory_end": np.bool_(True),
+        "x.position_loop.gpc.n2": np.int64(12),
+    }
+    expected = {"x.position_loop.gain": 1.5, "allow_nonzero_velocity_at_trajectory_end": True}
+    assert machine.with_(changes) == machine.with_({**expected, "x.position_loop.gpc.n2": 12})
+    coefficients = {"x.position_loop.rst.r": np.array([1.0, -0.5])}
+    assert machine.with_(coefficients) == machine.with_({"x.position_loop.rst.r": [1.0, -0.5]})
+
+
+def test_a_layout_of_an_array_does_not_matter(machine: va.Machine) -> None:
+    psec = va.scenario("corner-90").psec(machine)
+    expected = machine.simulate(psec).position
+    padded = np.zeros((2 * len(psec), 10))
+    padded[::2, ::2] = psec
+    locked = psec.copy()
+    locked.flags.writeable = False
+    for same in (np.asfortranarray(psec), padded[::2, ::2], locked, psec.tolist()):
+        assert np.array_equal(machine.simulate(same).position, expected)
+
+
+def test_models_and_controllers_can_be_pickled(machine: va.Machine) -> None:
+    model = va.design.model(machine, "x")
+    rst = va.design.gpc(model, 12, lambda_rel=0.1)
+    assert pickle.loads(pickle.dumps(model)) == model != va.design.model(machine, "y")
+    assert pickle.loads(pickle.dumps(rst)) == rst != va.design.gpc(model, 12, lambda_rel=0.2)
+    assert va.design.margins(*pickle.loads(pickle.dumps((model, rst)))) == va.design.margins(model, rst)
+    with pytest.raises(ValueError) as found:
+        machine.with_({"x.position_loop.gain": -1.0})
+    assert pickle.loads(pickle.dumps(found.value)).args == found.value.args
+
+
+def final_position(machine: va.Machine) -> list[float]:
+    """Returns the last positions of a scenario."""
+    return machine.simulate(va.scenario("corner-90"), figures="axes").position[-1].tolist()
+
+
+def test_threads_and_processes_have_the_same_bits(machine: va.Machine) -> None:
+    machines = [machine.with_({"x.position_loop.gain": gain}) for gain in (1.0, 1.5, 2.0, 2.5)]
+    expected = [final_position(one) for one in machines]
+    assert len({tuple(position) for position in expected}) == 4
+    with ThreadPoolExecutor(4) as threads:
+        assert list(threads.map(final_position, machines * 4)) == expected * 4
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as processes:
+        assert list(processes.map(final_position, machines, timeout=60)) == expected
+
+
+LONG = """
+import numpy as np, virtual_axes_py as va
+m = va.Machine.load()
+psec = np.zeros((300_000, 5)); psec[:, 0] = 0.01 * np.sin(np.arange(len(psec)) * 0.006) ** 2
+designs = va.random_variants(1, 100_000, {"x.position_loop.gain": (1.0, 2.0)})
+"""
+CALLS = {
+    "simulate": "m.simulate(np.tile(psec, (20, 1)), signals=[])",
+    "sweep": "va.sweep(m, designs, psec)",
+    "tune": "va.tune(m, psec, controller='gpc', designs=100_000)",
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_ctrl_c_ends_a_long_call_within_2_seconds(name: str) -> None:
+    program = f"{LONG}\nprint('ready', flush=True)\n{CALLS[name]}\n"
+    command = [sys.executable, "-c", program]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None and process.stdout.readline() == "ready\n"
+        time.sleep(1.5)
+        assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        start = time.monotonic()
+        _, errors = process.communicate(timeout=60)
+        duration = time.monotonic() - start
+    finally:
+        process.kill()
+        process.wait(timeout=10)
+    assert process.returncode != 0 and errors.rstrip().endswith("KeyboardInterrupt"), errors
+    assert duration < 2.0
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda m, psec: m.simulate(psec, signals=[]),
+        lambda m, psec: va.sweep(m, [{}, {"x.position_loop.gain": 2.0}] * 16, psec[:30_000]),
+        lambda m, psec: va.tune(m, psec[:20_000], controller="gpc", designs=100),
+    ],
+    ids=["simulate", "sweep", "tune"],
+)
+def test_other_threads_of_python_run_during_a_long_call(call, machine: va.Machine) -> None:
+    psec = np.zeros((300_000, 5))
+    psec[:, 0] = 0.01 * np.sin(np.arange(len(psec)) * 0.006) ** 2
+    count, is_running = 0, True
+
+    def tick() -> None:
+        nonlocal count
+        while is_running:
+            count += 1
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    start = time.monotonic()
+    before = count
+    try:
+        call(machine, psec)
+    finally:
+        duration, ticks = time.monotonic() - start, count - before
+        is_running = False
+        thread.join(timeout=10)
+    # With the lock held the thread would advance once at most.
+    assert duration > 0.05 and ticks > 50 * duration, (ticks, duration)
+
+
+def test_a_part_program_of_a_sweep_needs_no_file_at_the_workers(machine: va.Machine, tmp_path: Path) -> None:
+    file = tmp_path / "part.nc"
+    file.write_text("G21 G90 G94\nG1 X20 F3000\nY10\nM30\n")
+    program = va.nc_program(str(file))
+    found = va.sweep(machine, [{"x.position_loop.gain": 2.0}], program)
+    alone = machine.with_({"x.position_loop.gain": 2.0}).simulate(program, figures="axes")
+    assert found[0].figures == alone.figures
