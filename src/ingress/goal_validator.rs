@@ -62,29 +62,34 @@ fn tolerances(
     joints: &[JointLimits],
     defaults: &GoalDefaults,
 ) -> Result<Tolerances, Rejection> {
-    let list = |field: &str, requested: &[JointTolerance], defaults: &[Option<f64>]| {
-        joint_tolerances((field, requested), joint_indices, joints, defaults)
+    let list = |field: &str, requested: &[JointTolerance], default: &dyn Fn(usize) -> Tolerance| {
+        joint_tolerances((field, requested), joint_indices, joints, default)
+    };
+    let path = |joint: usize| Tolerance {
+        position: defaults.path.get(joint).copied().flatten(),
+        ..Tolerance::default()
+    };
+    let at_goal = |joint: usize| Tolerance {
+        position: defaults.goal.get(joint).copied().flatten(),
+        velocity: defaults.stopped_velocity,
+        ..Tolerance::default()
     };
     Ok(Tolerances {
-        path: list("path_tolerance", &goal.path_tolerance, &defaults.path)?,
-        goal: list("goal_tolerance", &goal.goal_tolerance, &defaults.goal)?,
-        goal_time: goal_time(&goal.goal_time_tolerance, defaults.goal_time)?,
+        path: list("path_tolerance", &goal.path_tolerance, &path)?,
+        goal: list("goal_tolerance", &goal.goal_tolerance, &at_goal)?,
+        goal_time: goal_time(&goal.goal_time_tolerance, defaults.goal_time)?.or(defaults.timeout),
     })
 }
 
-/// Returns one tolerance per joint of a trajectory from the entries `requested` of `field`; joints without an
-/// entry get their position tolerance from `defaults`.
+/// Returns one tolerance per joint of a trajectory from the entries `requested` of `field`; `default` returns that of a
+/// joint without an entry.
 fn joint_tolerances(
     (field, requested): (&str, &[JointTolerance]),
     joint_indices: &[usize],
     joints: &[JointLimits],
-    defaults: &[Option<f64>],
+    default: &dyn Fn(usize) -> Tolerance,
 ) -> Result<Vec<Tolerance>, Rejection> {
-    let default = |&joint: &usize| Tolerance {
-        position: defaults.get(joint).copied().flatten(),
-        ..Tolerance::default()
-    };
-    let mut list: Vec<Tolerance> = joint_indices.iter().map(default).collect();
+    let mut list: Vec<Tolerance> = joint_indices.iter().map(|&joint| default(joint)).collect();
     for (index, tolerance) in requested.iter().enumerate() {
         let rejection = |text: String| {
             let text = format!("{field}[{index}], joint {}: {text}", tolerance.name);
@@ -112,7 +117,7 @@ fn joint_tolerances(
         };
         *entry = Tolerance {
             position: limit("position", tolerance.position, entry.position)?,
-            velocity: limit("velocity", tolerance.velocity, None)?,
+            velocity: limit("velocity", tolerance.velocity, entry.velocity)?,
             acceleration: limit("acceleration", tolerance.acceleration, None)?,
         };
     }
@@ -154,7 +159,9 @@ mod tests {
         let defaults = GoalDefaults {
             path: vec![Some(1.0), Some(2.0), Some(3.0), None, None],
             goal: vec![None; 5],
+            stopped_velocity: Some(0.02),
             goal_time: Some(7),
+            timeout: Some(9),
         };
         // Trajectory of z and x, in this order.
         tolerances(goal, &[2, 0], &joints(), &defaults)
@@ -170,8 +177,21 @@ mod tests {
         let found = found(&goal).expect("valid tolerances");
         let tolerance = |position, velocity| Tolerance { position, velocity, acceleration: None };
         assert_eq!(found.path, [tolerance(None, None), tolerance(Some(1.0), Some(0.5))]);
-        assert_eq!(found.goal, [tolerance(None, None), tolerance(Some(0.25), None)]);
+        assert_eq!(found.goal, [tolerance(None, Some(0.02)), tolerance(Some(0.25), None)]);
         assert_eq!(found.goal_time, Some(7));
+    }
+
+    #[test]
+    fn an_unlimited_goal_time_ends_at_the_timeout() {
+        let goal = FollowJointTrajectoryGoal {
+            goal_time_tolerance: Duration { sec: -1, nanosec: 0 },
+            ..FollowJointTrajectoryGoal::default()
+        };
+        assert_eq!(
+            super::tolerances(&goal, &[0], &joints(), &GoalDefaults::default()).map(|t| t.goal_time),
+            Ok(None)
+        );
+        assert_eq!(found(&goal).map(|t| t.goal_time), Ok(Some(9)));
     }
 
     #[test]

@@ -17,6 +17,8 @@ pub struct TrajectoryValidator {
     pub period: Nanoseconds,
     /// Largest number of points of one trajectory.
     pub max_points: usize,
+    /// True if trajectories are interpolated between their points.
+    pub interpolates: bool,
     /// Node parameters that can be set at run time.
     pub live: Arc<LiveNodeParameters>,
 }
@@ -28,7 +30,10 @@ impl TrajectoryValidator {
     /// [`Rejection`] for the first violation found: NaN, wrong sizes, unknown joints, times, travel limits,
     /// speed; see [`Trajectory::new`].
     pub fn validate(&self, message: &JointTrajectory) -> Result<Trajectory, Rejection> {
-        let request = messages::request(message, self.max_points)?;
+        let mut request = messages::request(message, self.max_points)?;
+        if !self.interpolates {
+            request = request.without_interpolation();
+        }
         let context = ValidationContext {
             joints: &self.joints,
             period: self.period,

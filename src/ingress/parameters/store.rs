@@ -77,9 +77,20 @@ impl ParameterStore {
         self.parameters.get(name).map(to_ros)
     }
 
-    /// Returns the descriptor of a parameter; `None` if it is unknown.
+    /// Returns the descriptor of a parameter or an alias; `None` if it is unknown.
     pub fn describe(&self, name: &str) -> Option<ParameterDescriptor> {
-        self.parameters.definition(name).map(descriptor)
+        let descriptor = self.parameters.definition(name).map(descriptor)?;
+        Some(match self.parameters.alias(name) {
+            None => descriptor,
+            Some(alias) => ParameterDescriptor {
+                description: format!(
+                    "Name of {} in joint_trajectory_controller. Unit: {}.",
+                    alias.key, alias.unit
+                ),
+                range: Some(ParameterRange::Double { from: 0.0, to: f64::MAX, step: 0.0 }),
+                ..descriptor
+            },
+        })
     }
 
     /// Validates `changes` and returns the changed values and the resulting machine, without applying them.

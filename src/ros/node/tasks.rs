@@ -127,6 +127,7 @@ impl NodeTasks<'_> {
             joints: self.setup.joint_limits.clone(),
             period: self.setup.period,
             max_points: self.setup.node_config.max_points,
+            interpolates: self.setup.node_config.interpolates,
             live: Arc::clone(&self.live),
         });
         let (handle, shutdown) = ShutdownHandle::new();

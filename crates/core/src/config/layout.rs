@@ -6,8 +6,8 @@ use super::machine::AxisKind;
 use super::schema::DEFINITIONS;
 use crate::text::{nearest_name, shortened};
 
-/// Key prefixes of ROS parameter files that are not in the schema and that no joint may have as a name.
-const RESERVED: &[&str] = &["qos_overrides", "ros__parameters"];
+/// Key prefixes of aliases and of ROS parameter files that are not in the schema and that no joint may have as a name.
+const RESERVED: &[&str] = &["constraints", "qos_overrides", "ros__parameters"];
 
 /// Joint with the axis and motor types that determine its parameters.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -12,6 +12,7 @@
 //! # Ok::<(), virtual_axes_core::config::ConfigError>(())
 //! ```
 
+mod aliases;
 mod build;
 mod check;
 mod definition;
@@ -31,6 +32,7 @@ mod yaml_tree;
 #[cfg(test)]
 mod tests;
 
+pub use aliases::ParameterAlias;
 pub use definition::{DefaultValue, MotorKind, ParameterDefinition, ParameterKind, Presence, Scope};
 pub use error::{ConfigError, ValueSource};
 pub use machine::*;

@@ -45,6 +45,8 @@ pub struct NodeConfig {
     pub load_timeout: Nanoseconds,
     /// Maximum number of points of a trajectory.
     pub max_points: usize,
+    /// True if trajectories are interpolated between their points.
+    pub interpolates: bool,
     /// True if the last point of a trajectory may have a nonzero velocity.
     pub allow_nonzero_velocity_at_trajectory_end: bool,
     /// Rate of the action feedback, Hz.
@@ -66,8 +68,12 @@ pub struct GoalDefaults {
     pub path: Vec<Option<f64>>,
     /// Goal tolerance of each axis, m or rad; `None` disables it.
     pub goal: Vec<Option<f64>>,
+    /// Goal tolerance of the velocity of all axes, m/s or rad/s; `None` disables it.
+    pub stopped_velocity: Option<f64>,
     /// Goal time tolerance, ns; `None` disables it.
     pub goal_time: Option<Nanoseconds>,
+    /// Goal time tolerance of goals that have none, ns; `None` disables it.
+    pub timeout: Option<Nanoseconds>,
 }
 
 /// Tool pose and tool path topics.
@@ -125,6 +131,7 @@ impl Parameters {
             joint_prefix: self.text("joint_prefix"),
             load_timeout: to_ns(number("load_timeout"), SECOND_NS),
             max_points: count("max_points"),
+            interpolates: self.text("interpolation_method") == "splines",
             allow_nonzero_velocity_at_trajectory_end: self.flag("allow_nonzero_velocity_at_trajectory_end"),
             action_monitor_rate: number("action_monitor_rate"),
             tool: ToolConfig {
@@ -156,7 +163,9 @@ impl Parameters {
         GoalDefaults {
             path: column("path"),
             goal: column("goal"),
+            stopped_velocity: positive("stopped_velocity_tolerance"),
             goal_time: positive("goal_time_tolerance").map(|value| to_ns(value, SECOND_NS)),
+            timeout: positive("cmd_timeout").map(|value| to_ns(value, SECOND_NS)),
         }
     }
 }

@@ -75,6 +75,20 @@ pub(super) const NODE: &[ParameterDefinition] = &[
         .default(Number(0.0))
         .live()
         .describe("Default goal time tolerance of action goals; 0 disables it."),
+    ParameterDefinition::number("stopped_velocity_tolerance", "m/s or rad/s", 0.0, 1e6)
+        .of_node()
+        .default(Number(0.0))
+        .live()
+        .describe("Default goal tolerance of the velocity of action goals, on the velocity error at the end of the trajectory; 0 disables it."),
+    ParameterDefinition::number("cmd_timeout", "s", 0.0, 1e6)
+        .of_node()
+        .default(Number(0.0))
+        .live()
+        .describe("Timeout after the end of a trajectory for action goals without a goal time tolerance, which abort then; 0 disables it."),
+    ParameterDefinition::new("interpolation_method", "", ParameterKind::Choice(&["splines", "none"]))
+        .of_node()
+        .default(Text("splines"))
+        .describe("Interpolation of trajectories between points: by the fields of the points, or none: the setpoint is the next point, within the velocity limits."),
     ParameterDefinition::new("use_sim_time", "", ParameterKind::Flag).of_node().default(Flag(false)).describe("Use the time of the topic /clock."),
     ParameterDefinition::new("record", "", ParameterKind::Text)
         .of_node()

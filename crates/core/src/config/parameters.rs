@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use super::aliases::{self, ParameterAlias};
 use super::check::{Entries, ParameterEntry, check, joint_names};
 use super::definition::{ParameterDefinition, Scope};
 use super::error::{ConfigError, ValueSource};
@@ -242,7 +243,15 @@ impl Parameters {
         origin: &ValueSource,
     ) -> Result<Self, ConfigError> {
         let mut changed = Vec::with_capacity(assignments.len());
+        let (aliases, assignments): (Vec<_>, Vec<_>) =
+            assignments.into_iter().partition(|assignment| aliases::is_alias(&assignment.key));
         for Assignment { key, value, source } in assignments {
+            changed.push(key.clone());
+            entries.insert(key, ParameterEntry { value, source });
+        }
+        // The parameter of an alias depends on the type of the axis, and takes precedence over its own name.
+        for Assignment { key, value, source } in aliases {
+            let (key, value) = aliases::resolve(&key, &value, &source, &entries)?;
             changed.push(key.clone());
             entries.insert(key, ParameterEntry { value, source });
         }
@@ -264,8 +273,18 @@ impl Parameters {
         Ok(Self { entries, layout })
     }
 
-    /// Returns the value or the default of the parameter `key`, none if it has neither or is unknown.
+    /// Returns the parameter that the alias `key` names; `None` if it is no alias.
+    pub fn alias(&self, key: &str) -> Option<ParameterAlias> {
+        let plain = aliases::without_prefix(key, &self.text("joint_prefix"));
+        aliases::find(&plain, |name| Some(self.layout.joints.iter().find(|joint| joint.name == name)?.axis))
+    }
+
+    /// Returns the value or the default of the parameter or alias `key`, none if it has neither or is unknown.
     pub fn get(&self, key: &str) -> Option<Value> {
+        if aliases::is_alias(key) {
+            let alias = self.alias(key)?;
+            return Some(alias.from_parameter(self.get(&alias.key)?));
+        }
         match self.entries.get(key) {
             Some(entry) => Some(entry.value.clone()),
             None => self.definition(key)?.default_value(),
@@ -277,8 +296,12 @@ impl Parameters {
         self.entries.get(key).map(|entry| &entry.source)
     }
 
-    /// Returns the definition of the parameter with the full key `key` on this machine.
+    /// Returns the definition of the parameter with the full key `key` on this machine, for an alias that of its
+    /// parameter.
     pub fn definition(&self, key: &str) -> Option<&'static ParameterDefinition> {
+        if aliases::is_alias(key) {
+            return self.definition(&self.alias(key)?.key);
+        }
         self.layout.find(key, &ValueSource::named("")).ok()
     }
 

@@ -3,10 +3,11 @@
 
 use std::sync::Arc;
 
-use super::motions::{AbortReason, CancelState, MotionOutcome};
+use super::motions::{AbortReason, CancelState, MotionOutcome, PositionGrid};
 use super::tolerance::{ErrorHistory, Tolerances};
 use super::{Simulation, stream_delay};
 use crate::machine::{MachineError, MachineParameters};
+use crate::trajectory::spline::KinematicState;
 use crate::trajectory::{
     Admission, CancelOutcome, InvalidFeedOverride, JointSet, MotionChunk, MotionId, Rejection, StreamCounts,
     StreamEnd, Trajectory,
@@ -181,6 +182,23 @@ impl Simulation {
     /// Returns the feed override in effect at the last position cycle, the fraction of the planned speed.
     pub fn feed_rate(&self) -> f64 {
         self.timeline.feed_rate()
+    }
+
+    /// Returns the setpoints planned for all joints at `time` (ns), rounded up to a position cycle and at the earliest the
+    /// last one, and true if a trajectory commands one of them there; see
+    /// [`Timeline::planned_state`](crate::trajectory::Timeline::planned_state).
+    pub fn planned_states(&self, time: Nanoseconds) -> (Vec<KinematicState>, bool) {
+        let PositionGrid { origin, period } = self.grid;
+        let k = -(origin.saturating_sub(time).div_euclid(period));
+        let joints = 0..self.machine.axis_count();
+        let planned: Vec<_> = joints.filter_map(|joint| self.timeline.planned_state(joint, k)).collect();
+        let is_commanded = planned.iter().any(|(_, is_commanded)| *is_commanded);
+        (planned.into_iter().map(|(state, _)| state).collect(), is_commanded)
+    }
+
+    /// Returns true if a trajectory is active or waiting.
+    pub fn has_trajectory(&self) -> bool {
+        self.timeline.has_trajectory()
     }
 
     /// Sets the external force or torque on an axis, N or N·m, positive in positive direction, from the

@@ -187,11 +187,11 @@ impl Trajectory {
         self.final_stops.get(column)?.as_ref()
     }
 
-    /// Returns the state at the last point of `column` if its velocity is not zero.
+    /// Returns the state at the last point of `column` if its velocity is not zero and it is interpolated.
     fn end_in_motion(&self, column: usize) -> Option<KinematicState> {
         let last = self.points().checked_sub(1)?;
         let mut end = self.point(column, last);
-        if end.velocity == 0.0 {
+        if end.velocity == 0.0 || self.degrees[last] == SplineDegree::Step {
             return None;
         }
         if self.degrees[last] < SplineDegree::Quintic && last > 0 {

@@ -177,6 +177,11 @@ impl Timeline {
         self.clock.is_held = is_held;
     }
 
+    /// Returns true if a trajectory is active or waiting.
+    pub fn has_trajectory(&self) -> bool {
+        has_trajectory(&self.queues)
+    }
+
     /// Returns true during a feed hold.
     pub fn is_feed_hold(&self) -> bool {
         self.clock.is_held
@@ -226,6 +231,30 @@ impl Timeline {
             Some(plan) => plan.position(instant, self.period),
             None => queue.state.position,
         })
+    }
+
+    /// Returns the state planned for `joint` at position cycle `k`, at the earliest that of the last commanded instant,
+    /// with derivatives with respect to time, and true if a trajectory commands the joint there. Returns `None` for an
+    /// unknown joint.
+    ///
+    /// The plan contains everything accepted up to now, at the present feed override.
+    pub fn planned_state(&self, joint: usize, k: i64) -> Option<(KinematicState, bool)> {
+        let (queue, period) = (self.queues.get(joint)?, self.period);
+        let cycles = u32::try_from(k.saturating_sub(self.next_k - 1).max(0)).unwrap_or(u32::MAX);
+        let k = (self.next_k - 1).saturating_add(i64::from(cycles));
+        let instant = PlanInstant { k, path: self.clock.ahead(cycles, period) };
+        let Some(plan) = queue.plan_at(instant.path.instant(period)) else {
+            return Some((queue.state, false));
+        };
+        let is_commanded = plan.is_trajectory() && plan.slot.is_some() && !plan.has_ended(instant, period);
+        let state = match plan.kind {
+            _ if cycles == 0 => queue.state,
+            PlanKind::Hold(newest) => {
+                self.stream.state_after(joint, k - self.next_k, newest, queue.state.position)
+            }
+            _ => Self::state_of(&self.clock, plan, instant, period),
+        };
+        Some((state, is_commanded))
     }
 
     /// Returns the state planned for `joint` at instant `path_k` of the path time, at the earliest the state of the

@@ -74,6 +74,14 @@ impl TrajectoryRequest {
         Self { start, ..self }
     }
 
+    /// Returns the request without interpolation: between two points, the setpoint is the second one; before the first,
+    /// the commanded state.
+    #[must_use]
+    pub fn without_interpolation(mut self) -> Self {
+        self.degrees.fill(SplineDegree::Step);
+        self
+    }
+
     /// Returns time (ns from the start) and positions (m or rad) of the first point.
     pub fn first_point(&self) -> Option<(Nanoseconds, &[f64])> {
         let columns = self.positions.len() / self.times.len().max(1);

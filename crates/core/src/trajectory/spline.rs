@@ -1,10 +1,12 @@
-//! Spline segments: polynomials of degree 1 (linear), 3 (cubic) or 5 (quintic) between two points.
+//! Spline segments: polynomials of degree 1 (linear), 3 (cubic) or 5 (quintic) between two points, or a step.
 
 use crate::units::{Nanoseconds, seconds};
 
 /// Degree of a spline segment; it follows from the highest derivative given at its points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SplineDegree {
+    /// No interpolation: the next point right after the previous one.
+    Step,
     /// Positions only, constant velocity.
     Linear,
     /// Positions and velocities.
@@ -83,13 +85,16 @@ impl Segment {
         if elapsed >= self.duration as f64 {
             return self.ends.1;
         }
+        if self.degree == SplineDegree::Step {
+            return self.ends.1;
+        }
         let [c1, c2, c3, c4, c5] = self.coefficients;
         let s = elapsed / self.duration as f64;
         self.ends.0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
     }
 
     /// Returns the state `elapsed` ns after the start, clamped to the segment. The derivatives are those
-    /// of the polynomial; a linear segment has zero acceleration.
+    /// of the polynomial; a linear segment has zero acceleration, a step zero velocity.
     pub fn state(&self, elapsed: Nanoseconds) -> KinematicState {
         self.state_at(elapsed as f64)
     }
@@ -98,7 +103,7 @@ impl Segment {
     pub fn state_at(&self, elapsed: f64) -> KinematicState {
         let h = seconds(self.duration);
         let [c1, c2, c3, c4, c5] = self.coefficients;
-        if self.degree == SplineDegree::Linear {
+        if self.degree <= SplineDegree::Linear {
             let position = self.position_at(elapsed);
             return KinematicState { position, velocity: c1 / h, acceleration: 0.0 };
         }
@@ -114,6 +119,7 @@ fn coefficients(start: &KinematicState, end: &KinematicState, h: f64, degree: Sp
     let delta = end.position - start.position;
     let (m0, m1) = (start.velocity * h, end.velocity * h);
     match degree {
+        SplineDegree::Step => [0.0; 5],
         SplineDegree::Linear => [delta, 0.0, 0.0, 0.0, 0.0],
         SplineDegree::Cubic => [m0, 3.0 * delta - 2.0 * m0 - m1, m0 + m1 - 2.0 * delta, 0.0, 0.0],
         SplineDegree::Quintic => {
@@ -186,6 +192,14 @@ mod tests {
             segment.state(SECOND_NS),
             KinematicState { position: 0.5, velocity: -0.5, acceleration: 0.0 }
         );
+    }
+
+    #[test]
+    fn a_step_is_at_the_next_point_right_after_the_previous_one() {
+        let ends = (KinematicState::at_rest(1.0), KinematicState::at_rest(-1.0));
+        let segment = Segment::new(ends.0, ends.1, SECOND_NS, SplineDegree::Step);
+        assert_eq!(segment.state(0), ends.0);
+        assert_eq!([1, SECOND_NS, i64::MAX].map(|ns| segment.state(ns)), [ends.1; 3]);
     }
 
     #[test]

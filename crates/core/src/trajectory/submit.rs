@@ -6,7 +6,7 @@ use super::motion_table::Release;
 use super::plan::{JointPlan, PlanKind, TrajectoryColumn, elapsed};
 use super::rejection::{Rejection, RejectionCode};
 use super::request::Start;
-use super::spline::Segment;
+use super::spline::{KinematicState, Segment, SplineDegree};
 use super::stream::StreamEnd;
 use super::timeline::{MAX_WAITING, Timeline};
 use super::validation::check_samples;
@@ -209,12 +209,13 @@ impl Timeline {
         };
         let begin = elapsed(start_k, join_k, self.period);
         if begin < trajectory.first_time() {
-            let segment = Segment::new(
-                self.predicted(joint, join_k),
-                trajectory.point(column, 0),
-                trajectory.first_time() - begin,
-                trajectory.degree(0),
-            );
+            let (from, degree) = (self.predicted(joint, join_k), trajectory.degree(0));
+            let to = match degree {
+                // The commanded state is held until the first point.
+                SplineDegree::Step => KinematicState::at_rest(from.position),
+                _ => trajectory.point(column, 0),
+            };
+            let segment = Segment::new(from, to, trajectory.first_time() - begin, degree);
             path.approach = Some((begin, segment));
             self.check_approach(joint, &path, begin, &segment)?;
         } else {

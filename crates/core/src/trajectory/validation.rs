@@ -193,7 +193,7 @@ impl ColumnCheck<'_> {
 }
 
 /// Checks position and velocity of `segment` at `samples` + 1 equidistant instants of `interval`, ns from
-/// its start. A linear segment is checked at its ends only.
+/// its start. A linear segment and a step are checked at their ends only.
 pub(super) fn check_samples(
     joint: &JointLimits,
     point: usize,
@@ -201,7 +201,7 @@ pub(super) fn check_samples(
     interval: (Nanoseconds, Nanoseconds),
     samples: i64,
 ) -> Result<(), Rejection> {
-    let samples = if segment.degree() == SplineDegree::Linear { 1 } else { samples };
+    let samples = if segment.degree() <= SplineDegree::Linear { 1 } else { samples };
     let step = (interval.1 - interval.0) / samples;
     for i in 0..=samples {
         let time = if i == samples { interval.1 } else { interval.0 + i * step };

@@ -8,5 +8,6 @@ mod simulation_common;
 mod stream;
 mod trajectory_common;
 mod trajectory_properties;
+mod trajectory_steps;
 mod trajectory_timeline;
 mod trajectory_validation;
