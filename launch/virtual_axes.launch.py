@@ -32,6 +32,12 @@ ARGUMENTS = [
     ),
     ("namespace", "", None, "Namespace of the nodes"),
     ("name", PACKAGE, None, "Name of the node"),
+    (
+        "jtc_names",
+        "false",
+        ["true", "false"],
+        "Receive trajectories on ~/joint_trajectory instead of psec, as a joint_trajectory_controller with this `name`",
+    ),
     ("joint_prefix", "", None, "Prefix of the joint names"),
     ("frame_prefix", "", None, "Prefix of the frame names, as in cell/"),
     (
@@ -167,6 +173,7 @@ def start(context: LaunchContext) -> list[object]:
             name=name,
             namespace=namespace,
             parameters=[str(machine), parameters],
+            remappings=[("psec", "~/joint_trajectory")] if argument["jtc_names"] == "true" else [],
             ros_arguments=["--log-level", argument["log_level"]],
             output="screen",
         )

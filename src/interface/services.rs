@@ -1,5 +1,7 @@
 //! Services of the node.
 
+use virtual_axes_io::messages::CONTROL_PACKAGE;
+
 use super::NodeService;
 
 /// Creates a parameter service of rcl_interfaces.
@@ -22,6 +24,15 @@ pub const FEED_HOLD: NodeService =
     trigger("feed_hold", "feed hold: trajectories stop on their path within the limits of the axes");
 /// Service that continues the trajectories after a feed hold.
 pub const CYCLE_START: NodeService = trigger("cycle_start", "continues the trajectories after a feed hold");
+
+/// Service that returns the setpoints planned at a time.
+pub const QUERY_STATE: NodeService = NodeService {
+    label: "query_state",
+    package: CONTROL_PACKAGE,
+    service: "QueryTrajectoryState",
+    content: "setpoints of all joints planned at a time, rounded up to a position cycle; `success` is false at a time at \
+              which no trajectory commands a joint, and the setpoints are those held then",
+};
 
 /// Service that lists the parameters.
 pub const LIST_PARAMETERS: NodeService =
@@ -53,6 +64,7 @@ pub const SERVICES: &[NodeService] = &[
     STOP,
     FEED_HOLD,
     CYCLE_START,
+    QUERY_STATE,
     LIST_PARAMETERS,
     DESCRIBE_PARAMETERS,
     GET_PARAMETER_TYPES,

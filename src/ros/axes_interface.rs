@@ -9,7 +9,7 @@ use crate::ingress::StreamSetpoints;
 use virtual_axes_core::machine::{AxisSample, MachineParameters};
 use virtual_axes_core::simulation::{MotionEnd, Tolerances};
 use virtual_axes_core::trajectory::{
-    JointSet, MotionChunk, MotionId, PathPlace, Rejection, StreamEnd, Trajectory,
+    JointSet, KinematicState, MotionChunk, MotionId, PathPlace, Rejection, StreamEnd, Trajectory,
 };
 use virtual_axes_core::units::Nanoseconds;
 
@@ -63,12 +63,25 @@ pub enum Command {
     },
     /// Submits the setpoints of a stream.
     Stream(Arc<StreamSetpoints>),
+    /// Returns the setpoints planned at a time, ns.
+    QueryState(Nanoseconds, oneshot::Sender<PlannedSetpoints>),
     /// Applies changed machine parameters.
     UpdateParameters(Arc<MachineParameters>),
     /// Resets the machine to rest at home.
     Reset(oneshot::Sender<()>),
     /// Ends the thread.
     Shutdown,
+}
+
+/// Setpoints planned at a time.
+#[derive(Debug)]
+pub struct PlannedSetpoints {
+    /// Setpoint of each joint.
+    pub states: Vec<KinematicState>,
+    /// True if a trajectory commands a joint at that time.
+    pub is_commanded: bool,
+    /// True if a trajectory is active or waiting.
+    pub has_trajectory: bool,
 }
 
 /// Acceptance of a trajectory.

@@ -49,6 +49,7 @@ pub mod parameter_services;
 pub mod participant;
 mod process_memory;
 mod program;
+mod query_state;
 mod readers;
 mod recorder;
 mod remote_endpoints;

@@ -12,6 +12,7 @@ use crate::ros::endpoints::{Endpoints, Publisher};
 use crate::ros::parameter_services::ParameterServices;
 use crate::ros::participant::create_node;
 use crate::ros::program::ProgramGoals;
+use crate::ros::query_state::QueryStateService;
 use crate::ros::recorder::TopicRecorder;
 use crate::ros::renewable::EndpointContext;
 use crate::ros::rosout;
@@ -41,6 +42,7 @@ pub(super) struct NodeServices {
     pub(super) stop: TriggerService,
     pub(super) feed_hold: TriggerService,
     pub(super) cycle_start: TriggerService,
+    pub(super) query_state: QueryStateService,
     pub(super) parameters: ParameterServices,
 }
 
@@ -70,8 +72,9 @@ impl NodeEndpoints {
         let stop = TriggerService::new(&mut node, context, args, &STOP)?;
         let feed_hold = TriggerService::new(&mut node, context, args, &FEED_HOLD)?;
         let cycle_start = TriggerService::new(&mut node, context, args, &CYCLE_START)?;
+        let query_state = QueryStateService::new(&mut node, context, args)?;
         let parameters = ParameterServices::new(&mut node, context, args)?;
-        let services = NodeServices { reset, stop, feed_hold, cycle_start, parameters };
+        let services = NodeServices { reset, stop, feed_hold, cycle_start, query_state, parameters };
         Ok(NodeEndpoints {
             node,
             rosout,

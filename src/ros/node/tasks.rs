@@ -195,6 +195,7 @@ impl NodeTasks<'_> {
         self.tasks.spawn(services.stop.serve(act));
         let commands = self.commands.clone();
         self.tasks.spawn(services.reset.serve(move || reset_axes(commands.clone())));
+        self.tasks.spawn(services.query_state.serve(self.setup.joints.clone(), self.commands.clone()));
         for (service, is_held) in [(services.feed_hold, true), (services.cycle_start, false)] {
             let commands = self.commands.clone();
             self.tasks.spawn(service.serve(move || set_feed_hold(commands.clone(), is_held)));

@@ -7,7 +7,9 @@ use tokio::sync::{mpsc, watch};
 use tracing::{info, warn};
 
 use crate::ros::arc_pool::ArcPool;
-use crate::ros::axes_interface::{Accepted, COMMAND_QUEUE, Command, SampleFrame, SimulationReport};
+use crate::ros::axes_interface::{
+    Accepted, COMMAND_QUEUE, Command, PlannedSetpoints, SampleFrame, SimulationReport,
+};
 use crate::ros::health::{AxisHealth, ClockHealth, Health};
 use crate::ros::program::ProgramMonitor;
 use crate::ros::stream::StreamIntake;
@@ -208,6 +210,11 @@ impl Axes {
                 }
             }
             Command::Stream(setpoints) => stream.submit(simulation, &setpoints),
+            Command::QueryState(time, done) => {
+                let (states, is_commanded) = simulation.planned_states(time);
+                let has_trajectory = simulation.has_trajectory();
+                let _ = done.send(PlannedSetpoints { states, is_commanded, has_trajectory });
+            }
             Command::UpdateParameters(parameters) => {
                 if let Err(error) = simulation.update_parameters(parameters) {
                     warn!("changed parameters not applied: {error}");

@@ -169,6 +169,7 @@ impl PacedAxes {
             Command::ExtendMotion { .. } | Command::FinishMotion(_) => {}
             Command::SetFeedOverride(_)
             | Command::SetFeedHold(_)
+            | Command::QueryState(..)
             | Command::UpdateParameters(_)
             | Command::Shutdown => self.axes.apply(command),
         }

@@ -145,6 +145,30 @@ pub struct SpeedScalingFactor {
     pub factor: f64,
 }
 
+/// Request of the service `QueryTrajectoryState`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct QueryTrajectoryStateRequest {
+    /// Time of the setpoints.
+    pub time: Time,
+}
+
+/// Response of the service `QueryTrajectoryState`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct QueryTrajectoryStateResponse {
+    /// True if a trajectory commands the joints at that time.
+    pub success: bool,
+    /// Reason if not.
+    pub message: String,
+    /// Joints of the arrays below.
+    pub name: Vec<String>,
+    /// Setpoints, m or rad.
+    pub position: Vec<f64>,
+    /// Velocities of the setpoints, m/s or rad/s.
+    pub velocity: Vec<f64>,
+    /// Accelerations of the setpoints, m/s² or rad/s².
+    pub acceleration: Vec<f64>,
+}
+
 /// Request of the service `_action/send_goal`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SendGoalRequest<G = FollowJointTrajectoryGoal> {

@@ -14,7 +14,8 @@ mod trajectory;
 pub use control::{
     CONTROL_PACKAGE, ErrorCode, FeedbackMessage, FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult, GetResultRequest, GetResultResponse, JointComponentTolerance,
-    JointTolerance, JointTrajectoryControllerState, SendGoalRequest, SendGoalResponse, SpeedScalingFactor,
+    JointTolerance, JointTrajectoryControllerState, QueryTrajectoryStateRequest,
+    QueryTrajectoryStateResponse, SendGoalRequest, SendGoalResponse, SpeedScalingFactor,
 };
 pub use own::{DriveStates, MotorCurrents, PACKAGE, Source, Status, TrajectoryResult};
 pub use pose::{path, pose_stamped};

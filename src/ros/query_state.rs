@@ -1,0 +1,84 @@
+//! Service `~/query_state`: setpoints planned at a time.
+
+use futures::StreamExt;
+use futures::future::BoxFuture;
+use futures::stream::FuturesUnordered;
+use ros2_client::Node;
+use tokio::sync::{mpsc, oneshot};
+
+use super::args::RosArgs;
+use super::axes_interface::{Command, PlannedSetpoints};
+use super::renewable::EndpointContext;
+use super::response_limiter::ResponseLimiter;
+use super::service::{Service, ServiceError};
+use crate::interface::QUERY_STATE;
+use virtual_axes_core::units::seconds;
+use virtual_axes_io::messages::{QueryTrajectoryStateRequest, QueryTrajectoryStateResponse, nanoseconds};
+
+/// Number of requests that may wait.
+const DEPTH: usize = 10;
+
+/// Service `~/query_state`.
+pub struct QueryStateService(Service<QueryTrajectoryStateRequest, QueryTrajectoryStateResponse>);
+
+impl QueryStateService {
+    /// Creates the service.
+    ///
+    /// # Errors
+    /// [`ServiceError`] if the service cannot be created.
+    pub fn new(node: &mut Node, context: &EndpointContext, args: &RosArgs) -> Result<Self, ServiceError> {
+        Service::new(node, context, args, &QUERY_STATE, DEPTH).map(QueryStateService)
+    }
+
+    /// Serves until the node shuts down; `joints` are the names of the joints, with prefix.
+    pub async fn serve(self, joints: Vec<String>, commands: mpsc::Sender<Command>) {
+        let mut requests = self.0.requests();
+        let mut responses: FuturesUnordered<BoxFuture<'_, ()>> = FuturesUnordered::new();
+        let limiter = ResponseLimiter::default();
+        loop {
+            tokio::select! {
+                biased;
+                Some(()) = responses.next(), if !responses.is_empty() => {}
+                Some((permit, request)) = limiter.next(&mut requests) => match request {
+                    Ok((id, request)) => {
+                        let response = answer(&request, &joints, &commands).await;
+                        responses.push(self.0.respond(id, response, permit));
+                    }
+                    Err(reason) => tracing::warn!("{reason}"),
+                },
+                else => break,
+            }
+        }
+    }
+}
+
+/// Returns the response to a request.
+async fn answer(
+    request: &QueryTrajectoryStateRequest,
+    joints: &[String],
+    commands: &mpsc::Sender<Command>,
+) -> QueryTrajectoryStateResponse {
+    let time = nanoseconds(&request.time);
+    let (done, planned) = oneshot::channel();
+    // The channel is closed only at shutdown.
+    let _ = commands.send(Command::QueryState(time, done)).await;
+    let Ok(PlannedSetpoints { states, is_commanded, has_trajectory }) = planned.await else {
+        let message = "the node is shutting down".to_owned();
+        return QueryTrajectoryStateResponse { message, ..QueryTrajectoryStateResponse::default() };
+    };
+    let message = if is_commanded {
+        String::new()
+    } else if has_trajectory {
+        format!("no trajectory commands a joint at {} s", seconds(time))
+    } else {
+        "no trajectory is active or waiting".to_owned()
+    };
+    QueryTrajectoryStateResponse {
+        success: is_commanded,
+        message,
+        name: joints.to_vec(),
+        position: states.iter().map(|state| state.position).collect(),
+        velocity: states.iter().map(|state| state.velocity).collect(),
+        acceleration: states.iter().map(|state| state.acceleration).collect(),
+    }
+}
