@@ -29,6 +29,7 @@ mod border;
 mod machine;
 mod signals;
 mod state;
+mod state_bytes;
 mod stepping;
 
 pub use border::{VaStatus, va_last_error};
@@ -38,6 +39,7 @@ pub use machine::{
 };
 pub use signals::{VaSignals, va_currents, va_positions, va_signals, va_velocities};
 pub use state::{VaState, va_destroy_state, va_restore, va_save};
+pub use state_bytes::{va_state_read, va_state_size, va_state_write};
 pub use stepping::{
     va_preview_length, va_reset, va_set_loads, va_set_preview, va_step, va_step_for_ns, va_time_ns,
 };

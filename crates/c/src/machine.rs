@@ -38,7 +38,7 @@ impl VaMachine {
     }
 }
 
-fn discretize(config: &MachineConfig) -> Result<Arc<MachineParameters>, BorderError> {
+pub(crate) fn discretize(config: &MachineConfig) -> Result<Arc<MachineParameters>, BorderError> {
     MachineParameters::new(config).map(Arc::new).map_err(BorderError::invalid)
 }
 

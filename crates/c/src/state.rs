@@ -10,10 +10,10 @@ use crate::machine::VaMachine;
 
 /// State of a machine with its parameters, to return to.
 pub struct VaState {
-    names: Vec<CString>,
-    machine: Machine,
-    parameters: Parameters,
-    preview: Vec<f64>,
+    pub(crate) names: Vec<CString>,
+    pub(crate) machine: Machine,
+    pub(crate) parameters: Parameters,
+    pub(crate) preview: Vec<f64>,
 }
 
 /// Saves the state of a machine; `*state` is null after an error.

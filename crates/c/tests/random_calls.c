@@ -57,7 +57,7 @@ int main(int count, char **arguments) {
     char text[64];
     VaSignals signals;
     VaStatus status = VA_OK;
-    switch (below(16)) {
+    switch (below(17)) {
       case 0:
         if (!*machine) status = va_create(below(2) ? "mikron_ucp710" : word(), machine);
         break;
@@ -106,6 +106,21 @@ int main(int count, char **arguments) {
       case 15:
         status = va_restore(*machine, *saved);
         break;
+      case 16: {
+        /* A state through bytes, often damaged. */
+        size_t size = 0;
+        status = va_state_size(*saved, &size);
+        if (status != VA_OK) break;
+        uint8_t *bytes = malloc(size);
+        status = va_state_write(*saved, bytes, size);
+        VaState *read = NULL;
+        if (below(3) == 0) bytes[below(size)] ^= 1 << below(8);
+        if (status == VA_OK) status = va_state_read(*machine, bytes, below(3) ? size : below(size), &read);
+        if (read) status = va_restore(*machine, read);
+        va_destroy_state(read);
+        free(bytes);
+        break;
+      }
     }
     if (status > VA_INVALID) {
       fprintf(stderr, "call %ld: status %d: %s\n", call, (int)status, va_last_error());

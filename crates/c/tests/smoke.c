@@ -38,6 +38,20 @@ static void bad_calls(VaMachine *machine) {
   double values[AXES] = {0};
   char text[64];
   VaMachine *none = (VaMachine *)1;
+  /* The state within a position cycle as bytes, in another machine. */
+  CHECK(va_step_for_ns(machine, 375000, psec, AXES) == VA_OK);
+  VaState *part = NULL;
+  CHECK(va_save(machine, &part) == VA_OK);
+  VaMachine *copy = copy_by_bytes(part);
+  for (int cycle = 0; cycle < 50; cycle++) {
+    psec[1] += 0.0001;
+    CHECK(va_step_for_ns(machine, 6125000, psec, AXES) == VA_OK && va_positions(machine, position, AXES) == VA_OK);
+    CHECK(va_step_for_ns(copy, 6125000, psec, AXES) == VA_OK && va_positions(copy, other, AXES) == VA_OK);
+    CHECK(memcmp(position, other, sizeof position) == 0);
+  }
+  CHECK(va_time_ns(copy) == va_time_ns(machine));
+  va_destroy(copy);
+
   VaSignals signals;
 
   check_error(va_create(NULL, &none), VA_NULL_POINTER, "name");
@@ -70,10 +84,45 @@ static void bad_calls(VaMachine *machine) {
   check_error(va_parameter(machine, "x.position_loop.gian", text, sizeof text), VA_INVALID, "unknown");
   check_error(va_save(machine, NULL), VA_NULL_POINTER, "state");
   check_error(va_restore(machine, NULL), VA_NULL_POINTER, "state");
+  size_t size = 0;
+  VaState *state = NULL;
+  check_error(va_state_size(NULL, &size), VA_NULL_POINTER, "state");
+  check_error(va_state_write(NULL, (uint8_t *)text, 1), VA_NULL_POINTER, "state");
+  check_error(va_state_read(machine, NULL, 1, &state), VA_NULL_POINTER, "bytes");
+  check_error(va_state_read(machine, (const uint8_t *)text, sizeof text, NULL), VA_NULL_POINTER, "state");
+  check_error(va_state_read(machine, (const uint8_t *)text, sizeof text, &state), VA_INVALID, "no state");
+  check_error(va_state_read(machine, (const uint8_t *)text, SIZE_MAX, &state), VA_INVALID, "size");
   CHECK(va_axis_count(NULL) == 0 && va_axis_name(NULL, 0) == NULL && va_axis_name(machine, AXES) == NULL);
   CHECK(va_time_ns(NULL) == 0 && va_preview_length(NULL) == 0 && va_position_period_ns(NULL) == 0);
   va_destroy(NULL);
   va_destroy_state(NULL);
+}
+
+/* Writes a state to bytes and destroys it; reads it into another machine, which has other parameters. */
+static VaMachine *copy_by_bytes(VaState *state) {
+  size_t size = 0;
+  CHECK(va_state_size(state, &size) == VA_OK && size > 1000);
+  uint8_t *bytes = malloc(size);
+  check_error(va_state_write(state, bytes, size - 1), VA_INVALID, "va_state_size");
+  check_error(va_state_write(state, NULL, size), VA_NULL_POINTER, "bytes");
+  CHECK(va_state_write(state, bytes, size) == VA_OK);
+  va_destroy_state(state);
+  VaMachine *copy = NULL;
+  CHECK(va_create("linear_motor_center", &copy) == VA_OK);
+  check_error(va_state_read(copy, bytes, size, &state), VA_INVALID, "other axes or periods");
+  va_destroy(copy);
+  CHECK(va_create("mikron_ucp710", &copy) == VA_OK);
+  CHECK(va_set_parameter(copy, "x.position_loop.gain", "3") == VA_OK);
+  check_error(va_state_read(copy, bytes, size - 1, &state), VA_INVALID, "truncated or damaged");
+  CHECK(!state);
+  bytes[size / 2] ^= 1;
+  check_error(va_state_read(copy, bytes, size, &state), VA_INVALID, "truncated or damaged");
+  bytes[size / 2] ^= 1;
+  CHECK(va_state_read(copy, bytes, size, &state) == VA_OK && state);
+  CHECK(va_restore(copy, state) == VA_OK);
+  va_destroy_state(state);
+  free(bytes);
+  return copy;
 }
 
 int main(void) {

@@ -1,5 +1,7 @@
 //! Bumpless transfer from one position controller to another.
 
+use crate::state_codec::StateCodec;
+
 /// Bumpless transfer to another position controller while the axis moves.
 ///
 /// If the first Ω* + VFFWS of the new controller differs from the last one by more than `max_step`, the excess fades
@@ -30,6 +32,13 @@ pub struct BumplessTransferState {
 }
 
 impl BumplessTransferState {
+    /// Writes or replaces the state.
+    pub(super) fn code(&mut self, codec: &mut StateCodec<'_>) {
+        codec.flag(&mut self.is_pending);
+        codec.numbers([&mut self.command_offset, &mut self.setpoint_offset]);
+        codec.cycles(&mut self.elapsed_cycles);
+    }
+
     /// Ends the transfer.
     pub(super) fn end(&mut self) {
         *self = BumplessTransferState::default();

@@ -2,6 +2,7 @@
 
 use super::bumpless_transfer::{BumplessTransfer, BumplessTransferState};
 use super::rst::{MAX_COEFFICIENTS, Rst};
+use crate::state_codec::StateCodec;
 
 /// Largest movement per position cycle of an axis at standstill, relative to the standstill tolerance.
 const CREEP_TOLERANCE: f64 = 1e-3;
@@ -92,6 +93,17 @@ impl PositionState {
     pub fn record_saturated(&mut self, speed: f64) {
         self.commands.replace_newest(speed);
         self.cycles_since_saturation = 0;
+    }
+
+    /// Writes or replaces the state.
+    pub(crate) fn code(&mut self, codec: &mut StateCodec<'_>) {
+        for history in [&mut self.angles, &mut self.commands] {
+            codec.numbers(&mut history.ring);
+            history.newest = codec.integer(history.newest as u64, MAX_COEFFICIENTS as u64 - 1) as usize;
+        }
+        codec.cycles(&mut self.standstill_cycles);
+        codec.cycles(&mut self.cycles_since_saturation);
+        self.transfer.code(codec);
     }
 
     /// Starts a bumpless transfer to another controller at the next position cycle.

@@ -1,7 +1,11 @@
 //! Zero-order-held position setpoints: history, preview, delays α, β, γ, and feedforward of their derivatives.
 
 use crate::config::{DelaysConfig, FeedforwardConfig};
+use crate::state_codec::StateCodec;
 use crate::units::Nanoseconds;
+
+/// Largest number of setpoints of a stored state, so that no tick overflows.
+const MAX_COUNT: u64 = 1 << 40;
 
 /// Delays of the setpoint, ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -137,6 +141,14 @@ impl SetpointHistory {
             resized.store(k, self.at(k.max(oldest)));
         }
         *self = resized;
+    }
+
+    /// Writes or replaces the stored setpoints.
+    pub(crate) fn code(&mut self, codec: &mut StateCodec<'_>) {
+        self.count = codec.integer(self.count, MAX_COUNT);
+        let (first, second) = self.ring.split_at_mut(self.ring.len() / 2);
+        codec.numbers(first.iter_mut());
+        second.copy_from_slice(first);
     }
 
     /// Appends the setpoint of the next position cycle.

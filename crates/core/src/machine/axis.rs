@@ -8,6 +8,7 @@ use crate::control::{
     TickDelay,
 };
 use crate::drive::{MotorState, Plant};
+use crate::state_codec::StateCodec;
 use crate::units::seconds;
 
 use super::compensation::FrictionCompensation;
@@ -181,6 +182,15 @@ impl Axis {
             self.position.begin_transfer();
         }
         self.sample.controller = p.controller;
+    }
+
+    /// Writes or replaces the state.
+    pub(super) fn code(&mut self, codec: &mut StateCodec<'_>) {
+        codec.numbers([&mut self.load, &mut self.velocity_offset, &mut self.previous_load]);
+        self.psec.code(codec);
+        self.position.code(codec);
+        self.inputs = self.inputs.map(&mut |value| codec.number(*value));
+        self.sample.code(codec);
     }
 
     pub(super) fn set_load(&mut self, load: f64) {

@@ -7,6 +7,7 @@ use super::inner_loops::{
     TickSpan,
 };
 use crate::drive::MotorState;
+use crate::state_codec::StateCodec;
 
 /// Lanes of the small block, used for up to four axes if the widest vector of the processor has at most four lanes:
 /// there one axis takes 37 % less time in it than in the large block (docs/internals/performance.md, block sizes).
@@ -152,6 +153,12 @@ impl AxisBank {
     #[inline]
     pub fn statistics(&self, axis: usize) -> CycleStatistics {
         with_lane!(&self.blocks, axis, block_and_lane, |block, lane| block.statistics.0.lane(lane))
+    }
+
+    /// Writes or replaces the state of an axis.
+    pub fn code(&mut self, axis: usize, codec: &mut StateCodec<'_>) {
+        let ticks = self.ticks;
+        with_lane!(&mut self.blocks, axis, block_and_lane_mut, |block, lane| block.code(lane, ticks, codec));
     }
 
     /// Runs one position cycle; `record_all` records every tick, otherwise the first one only.

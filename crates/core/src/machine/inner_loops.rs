@@ -11,6 +11,7 @@ use pulp::Simd;
 use crate::control::{Pi, PiState};
 use crate::drive::{FrictionExpansion, GravityExpansion, MotorState, Plant};
 use crate::simd::{SimdLoad, SimdReal, Unroll2, Vector, soa_struct};
+use crate::state_codec::StateCodec;
 
 soa_struct! {
     /// Parameters of one axis inside its position loop: plant, velocity controller, current controller.
@@ -221,6 +222,35 @@ impl<const L: usize> AxisBlock<L> {
     pub fn set_state(&mut self, lane: usize, state: &InnerLoopState) {
         self.state.0.set_lane(lane, state);
         self.expand(lane);
+    }
+
+    /// Writes or replaces the state in a lane, with that within a position cycle and the records of its ticks.
+    pub fn code(&mut self, lane: usize, ticks: CycleTicks, codec: &mut StateCodec<'_>) {
+        macro_rules! code {
+            ($values:expr) => {
+                let values = $values.0.lane(lane).map(&mut |value| codec.number(*value));
+                $values.0.set_lane(lane, &values);
+            };
+        }
+        code!(self.state);
+        code!(self.inputs);
+        code!(self.friction_expansion);
+        code!(self.gravity_expansion);
+        code!(self.statistics);
+        code!(self.span_state);
+        let rows = codec.integer(self.compensation.len() as u64, ticks.velocity_cycles() as u64) as usize;
+        let records = codec.integer(self.records.len() as u64, ticks.position as u64) as usize;
+        // Another axis of the block can have more rows.
+        self.compensation.resize_with(rows.max(self.compensation.len()), || Aligned([0.0; L]));
+        let record = || Aligned(TickRecord::default().fill());
+        self.records.resize_with(records.max(self.records.len()), record);
+        codec.numbers(self.compensation[..rows].iter_mut().map(|row| &mut row.0[lane]));
+        for row in &mut self.motors {
+            code!(row);
+        }
+        for row in &mut self.records[..records] {
+            code!(row);
+        }
     }
 
     /// Sets the inputs of a lane for the next position cycle.

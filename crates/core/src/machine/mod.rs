@@ -10,12 +10,14 @@ mod controller;
 mod inner_loops;
 mod prediction;
 mod sample;
+mod stored;
 
 pub use axis::{Axis, AxisParameters};
 pub use bank::SimdWidth;
 pub use controller::{FALLBACK_DELAY, design_controller};
 pub use prediction::{deviating_plant_model, prediction_model};
 pub use sample::AxisSample;
+pub use stored::StateError;
 
 use std::sync::Arc;
 

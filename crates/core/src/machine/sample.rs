@@ -1,5 +1,7 @@
 //! Signals of an axis at one tick.
 
+use crate::state_codec::StateCodec;
+
 /// Signals of one axis at one tick (Prévost fig. 3).
 ///
 /// Axis quantities are in m or rad, motor quantities in rad and N·m (m and N for a linear motor).
@@ -43,6 +45,28 @@ pub struct AxisSample {
 }
 
 impl AxisSample {
+    /// Writes or replaces the signals; the name of the controller is that of the parameters.
+    pub(super) fn code(&mut self, codec: &mut StateCodec<'_>) {
+        codec.numbers([
+            &mut self.psec,
+            &mut self.delayed_psec,
+            &mut self.position,
+            &mut self.velocity,
+            &mut self.current,
+            &mut self.current_setpoint,
+            &mut self.voltage,
+            &mut self.velocity_setpoint,
+            &mut self.velocity_feedforward,
+            &mut self.torque_feedforward,
+            &mut self.friction_current,
+            &mut self.gravity_current,
+            &mut self.load_current,
+            &mut self.effort,
+        ]);
+        codec.flag(&mut self.saturated);
+        codec.flag(&mut self.friction_extrapolated);
+    }
+
     /// Returns the following error `PSEC_k − SP`, m or rad; it contains the pure delay α.
     pub fn following_error(&self) -> f64 {
         self.psec - self.position

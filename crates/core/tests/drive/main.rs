@@ -7,3 +7,4 @@ mod parameter_ranges;
 mod partial_cycles;
 mod scalar_c;
 mod simd;
+mod stored_states;
