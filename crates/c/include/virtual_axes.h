@@ -296,6 +296,40 @@ enum VaStatus va_restore(struct VaMachine *machine, const struct VaState *state)
 void va_destroy_state(struct VaState *state);
 
 /**
+ * Writes the number of bytes of a state to `size`.
+ *
+ * # Safety
+ * `state` is null or a state of this library, `size` null or a pointer to a number.
+ */
+enum VaStatus va_state_size(const struct VaState *state, size_t *size);
+
+/**
+ * Writes a state with the parameters of its machine to `bytes`, to store it or to read it in another process.
+ *
+ * `size` must be that of `va_state_size`.
+ *
+ * # Safety
+ * `state` is null or a state of this library, `bytes` null or space for `size` bytes.
+ */
+enum VaStatus va_state_write(const struct VaState *state, uint8_t *bytes, size_t size);
+
+/**
+ * Reads a state that `va_state_write` has written; `*state` is null after an error.
+ *
+ * `va_restore` returns `machine` to it, with the parameters of that time, and it goes on with the same bits. The axes and
+ * periods of the machine must be those of the state. Bytes that are truncated, damaged, or written by another version are
+ * an error.
+ *
+ * # Safety
+ * `machine` is null or a machine of this library, `bytes` null or a pointer to `size` bytes, `state` null or a pointer to a
+ * pointer.
+ */
+enum VaStatus va_state_read(const struct VaMachine *machine,
+                            const uint8_t *bytes,
+                            size_t size,
+                            struct VaState **state);
+
+/**
  * Advances by one position cycle with the setpoints `psec`, m or rad, one per axis.
  *
  * Within a position cycle, after `va_step_for_ns`, it advances by the same time.
