@@ -311,7 +311,9 @@ enum VaStatus va_state_size(const struct VaState *state, size_t *size);
  * # Safety
  * `state` is null or a state of this library, `bytes` null or space for `size` bytes.
  */
-enum VaStatus va_state_write(const struct VaState *state, uint8_t *bytes, size_t size);
+enum VaStatus va_state_write(const struct VaState *state,
+                             uint8_t *bytes,
+                             size_t size);
 
 /**
  * Reads a state that `va_state_write` has written; `*state` is null after an error.
