@@ -63,6 +63,7 @@ fn validator() -> TrajectoryValidator {
         joints: JOINTS.clone(),
         period: MACHINE.periods().position,
         max_points: config.max_points,
+        interpolates: true,
         live,
     }
 }

@@ -29,7 +29,13 @@ fn joints() -> Vec<JointLimits> {
 fn validator() -> TrajectoryValidator {
     let config = DEFAULT.machine_config().expect("default machine");
     let live = Arc::new(LiveNodeParameters::default());
-    TrajectoryValidator { joints: joints(), period: config.periods().position, max_points: 1000, live }
+    TrajectoryValidator {
+        joints: joints(),
+        period: config.periods().position,
+        max_points: 1000,
+        interpolates: true,
+        live,
+    }
 }
 
 fn at_rest() -> Simulation {

@@ -30,7 +30,7 @@ pub struct ParameterAlias {
 
 impl ParameterAlias {
     /// Returns the value of the alias for a value of the parameter.
-    pub(super) fn from_parameter(&self, value: Value) -> Value {
+    pub(super) fn alias_value(&self, value: Value) -> Value {
         match value {
             Value::Double(number) => Value::Double(number / self.factor),
             other => other,
@@ -38,7 +38,7 @@ impl ParameterAlias {
     }
 
     /// Returns the value of the parameter for a value of the alias.
-    pub(super) fn to_parameter(&self, value: Value) -> Value {
+    pub(super) fn parameter_value(&self, value: Value) -> Value {
         match value {
             Value::Double(number) => Value::Double(number * self.factor),
             Value::Integer(number) => Value::Double(number as f64 * self.factor),
@@ -109,7 +109,7 @@ pub(super) fn resolve(
         Value::Double(number) if !(*number >= 0.0 && number.is_finite()) => {}
         Value::Integer(number) if *number < 0 => {}
         Value::Double(_) | Value::Integer(_) => {
-            return Ok((alias.key.clone(), alias.to_parameter(value.clone())));
+            return Ok((alias.key.clone(), alias.parameter_value(value.clone())));
         }
         other => {
             return Err(ConfigError::WrongType {

@@ -283,7 +283,7 @@ impl Parameters {
     pub fn get(&self, key: &str) -> Option<Value> {
         if aliases::is_alias(key) {
             let alias = self.alias(key)?;
-            return Some(alias.from_parameter(self.get(&alias.key)?));
+            return Some(alias.alias_value(self.get(&alias.key)?));
         }
         match self.entries.get(key) {
             Some(entry) => Some(entry.value.clone()),
