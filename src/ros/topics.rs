@@ -110,8 +110,10 @@ impl Topics {
             .into_iter()
             .chain(clock.iter().map(|(_, name)| name.clone()))
             .collect(),
-            services: [interface::RESET, interface::STOP, interface::FEED_HOLD, interface::CYCLE_START]
+            // Every node has parameter services.
+            services: interface::SERVICES
                 .iter()
+                .filter(|service| service.package != "rcl_interfaces")
                 .filter_map(|service| args.resolve_service(&service.name()).ok())
                 .collect(),
             actions: Vec::new(),
