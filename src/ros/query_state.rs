@@ -1,15 +1,11 @@
 //! Service `~/query_state`: setpoints planned at a time.
 
-use futures::StreamExt;
-use futures::future::BoxFuture;
-use futures::stream::FuturesUnordered;
 use ros2_client::Node;
 use tokio::sync::{mpsc, oneshot};
 
 use super::args::RosArgs;
 use super::axes_interface::{Command, PlannedSetpoints};
 use super::renewable::EndpointContext;
-use super::response_limiter::ResponseLimiter;
 use super::service::{Service, ServiceError};
 use crate::interface::QUERY_STATE;
 use virtual_axes_core::units::seconds;
@@ -32,29 +28,13 @@ impl QueryStateService {
 
     /// Serves until the node shuts down; `joints` are the names of the joints, with prefix.
     pub async fn serve(self, joints: Vec<String>, commands: mpsc::Sender<Command>) {
-        let mut requests = self.0.requests();
-        let mut responses: FuturesUnordered<BoxFuture<'_, ()>> = FuturesUnordered::new();
-        let limiter = ResponseLimiter::default();
-        loop {
-            tokio::select! {
-                biased;
-                Some(()) = responses.next(), if !responses.is_empty() => {}
-                Some((permit, request)) = limiter.next(&mut requests) => match request {
-                    Ok((id, request)) => {
-                        let response = answer(&request, &joints, &commands).await;
-                        responses.push(self.0.respond(id, response, permit));
-                    }
-                    Err(reason) => tracing::warn!("{reason}"),
-                },
-                else => break,
-            }
-        }
+        self.0.serve(|request| answer(request, &joints, &commands)).await;
     }
 }
 
 /// Returns the response to a request.
 async fn answer(
-    request: &QueryTrajectoryStateRequest,
+    request: QueryTrajectoryStateRequest,
     joints: &[String],
     commands: &mpsc::Sender<Command>,
 ) -> QueryTrajectoryStateResponse {

@@ -9,7 +9,9 @@ use std::future::ready;
 use std::sync::Arc;
 use std::time::Duration;
 
-use futures::{FutureExt, StreamExt, future::BoxFuture, stream::BoxStream};
+use futures::future::BoxFuture;
+use futures::stream::{BoxStream, FuturesUnordered};
+use futures::{FutureExt, StreamExt};
 use ros2_client::qos::{History, QosProfile, WhenFull};
 use ros2_client::service::RmwRequestId;
 use ros2_client::{Context, Node, ServiceTypeName};
@@ -19,7 +21,7 @@ use serde::de::DeserializeOwned;
 use super::args::RosArgs;
 use super::large_response::LargeResponses;
 use super::renewable::{DeliveredSamples, EndpointContext, Renewable};
-use super::response_limiter::ResponsePermit;
+use super::response_limiter::{ResponseLimiter, ResponsePermit};
 use super::service_endpoints::ServiceOfParticipant;
 use crate::interface::NodeService;
 
@@ -193,6 +195,31 @@ where
         wrap: impl Fn(RmwRequestId, Q) -> R + Send + 'a,
     ) -> BoxStream<'a, Result<R, String>> {
         self.requests().map(move |received| received.map(|(id, request)| wrap(id, request))).boxed()
+    }
+
+    /// Serves until the node shuts down; `answer` executes a request and returns its response.
+    pub async fn serve<F>(self, answer: impl Fn(Q) -> F + Send)
+    where
+        F: Future<Output = A> + Send,
+    {
+        let mut requests = self.requests();
+        // Responses are sent concurrently: a client that has disconnected does not delay the response of another.
+        let mut responses: FuturesUnordered<BoxFuture<'_, ()>> = FuturesUnordered::new();
+        let limiter = ResponseLimiter::default();
+        loop {
+            tokio::select! {
+                biased;
+                Some(()) = responses.next(), if !responses.is_empty() => {}
+                Some((permit, request)) = limiter.next(&mut requests) => match request {
+                    Ok((id, request)) => {
+                        let response = answer(request).await;
+                        responses.push(self.respond(id, response, permit));
+                    }
+                    Err(reason) => tracing::warn!("{reason}"),
+                },
+                else => break,
+            }
+        }
     }
 
     /// Sends the response to a request as soon as its client is discovered, then releases `permit`.

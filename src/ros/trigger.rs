@@ -1,14 +1,11 @@
 //! Services of type `std_srvs/Trigger`.
 
-use futures::StreamExt;
-use futures::future::BoxFuture;
-use futures::stream::FuturesUnordered;
+use futures::FutureExt;
 use ros2_client::Node;
 use ros2_interfaces_jazzy_serde::std_srvs::srv::{TriggerRequest, TriggerResponse};
 
 use super::args::RosArgs;
 use super::renewable::EndpointContext;
-use super::response_limiter::ResponseLimiter;
 use super::service::{Service, ServiceError};
 use crate::interface::NodeService;
 
@@ -37,26 +34,10 @@ impl TriggerService {
     where
         F: Future<Output = Result<String, String>> + Send,
     {
-        let mut requests = self.0.requests();
-        // Responses are sent concurrently: a client that has disconnected does not delay the stop of another.
-        let mut responses: FuturesUnordered<BoxFuture<'_, ()>> = FuturesUnordered::new();
-        let limiter = ResponseLimiter::default();
-        loop {
-            tokio::select! {
-                biased;
-                Some(()) = responses.next(), if !responses.is_empty() => {}
-                Some((permit, request)) = limiter.next(&mut requests) => match request {
-                    Ok((id, _)) => {
-                        let (success, message) = match act().await {
-                            Ok(message) => (true, message),
-                            Err(message) => (false, message),
-                        };
-                        responses.push(self.0.respond(id, TriggerResponse { success, message }, permit));
-                    }
-                    Err(reason) => tracing::warn!("{reason}"),
-                },
-                else => break,
-            }
-        }
+        let respond = |response: Result<String, String>| {
+            let success = response.is_ok();
+            TriggerResponse { success, message: response.unwrap_or_else(|reason| reason) }
+        };
+        self.0.serve(move |_| act().map(respond)).await;
     }
 }
