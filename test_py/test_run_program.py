@@ -281,7 +281,7 @@ def test_a_program_runs_in_real_time(start: Callable[..., AxesClient]) -> None:
     """A chunk that is late stops the axes on the path, so that the setpoints keep their limits in any case."""
     drive = start("-p", "time:=real")
     with Follow(drive, f"{drive.target}/run_program", kind=RunProgram) as programs:
-        sent = programs.send(Goal(path=str(ROOT / "config/programs/circle-diamond-square.nc"), feed_override=2.0))
+        sent = programs.send(Goal(path="circle-diamond-square", feed_override=2.0))
         sent.wait_for_feedback(40, timeout=40)
         sent.cancel()
         assert sent.status(30) == GoalStatus.STATUS_CANCELED

@@ -135,12 +135,16 @@ def test_machines_runs_and_setpoints_can_be_pickled(machine: va.Machine) -> None
 
 
 def test_a_part_program_runs_as_by_the_command(machine: va.Machine) -> None:
-    program = str(sorted((ROOT / "config/programs").glob("*.n*c"))[0])
+    program = str(ROOT / "config/programs/circle-diamond-square.nc")
     command = [COMMAND, "run", program, "--json"]
     done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=300)
     expected = json.loads(done.stdout)["runs"][0]
-    run = machine.simulate(va.nc_program(program))
-    assert run.figures["axes"] == expected["axes"]
+    assert "circle-diamond-square" in va.nc_program_names()
+    for name_or_path in (program, "circle-diamond-square"):
+        run = machine.simulate(va.nc_program(name_or_path))
+        assert run.figures["axes"] == expected["axes"]
+    with pytest.raises(ValueError, match="circle-diamond-square: is a part program; load it with nc_program"):
+        va.scenario("circle-diamond-square")
 
 
 @pytest.mark.parametrize(

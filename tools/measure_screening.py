@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures the time to screen tunings, and the speedup by a second core.
 
-    cargo build --release --no-default-features --bin virtual_axes
+    cargo build --release --no-default-features --features cli --bin virtual_axes
     tools/measure_screening.py                          # 100 000 designs on the ballbar
     tools/measure_screening.py --designs 5000 --scenario corner-90
 

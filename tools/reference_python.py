@@ -20,6 +20,7 @@ NATIVE = {
     "`psec(machine)`, an array (setpoints, axes), m or rad.",
     "PartProgram": "Part program in G code: `path`, and `psec(machine)`, an array (setpoints, axes), m or rad.",
     "machine_names": "Names of the built-in machines, the default first.",
+    "nc_program_names": "Names of the built-in part programs.",
     "scenario_names": "Names of the built-in scenarios.",
     "PredictionModel": "Discrete transfer function from Ω* to θ, `A(q⁻¹) θ = B(q⁻¹) Ω*`: coefficients `a`, `b`, and "
     "`period`, s.",

@@ -85,6 +85,8 @@ fn shipped_programs_are_valid_on_both_machines() {
         for machine in ["mikron_ucp710", "linear_motor_center"] {
             let output = check(&[&file.to_string_lossy(), "--machine", machine]);
             assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+            let named = check(&[name, "--machine", machine]);
+            assert_eq!(named.stdout, output.stdout, "{name}");
         }
     }
 }

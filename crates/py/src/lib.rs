@@ -31,7 +31,7 @@ mod _native {
     #[pymodule_export]
     use super::machine::{PyMachine, machine_names};
     #[pymodule_export]
-    use super::setpoints::{PartProgram, PyScenario, scenario_names};
+    use super::setpoints::{PartProgram, PyScenario, nc_program_names, scenario_names};
     #[pymodule_export]
     use super::stepper::{Stepper, StepperState};
     #[pymodule_export]

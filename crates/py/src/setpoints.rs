@@ -1,7 +1,5 @@
 //! Setpoints from scenarios and part programs.
 
-use std::fs::File;
-use std::io::BufReader;
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -10,6 +8,7 @@ use virtual_axes_core::path::Program;
 use virtual_axes_core::scenario::Scenario as CoreScenario;
 use virtual_axes_core::simulation::joint_limits;
 use virtual_axes_core::trial::{GridSource, ProgramSource, SourceError};
+use virtual_axes_nc::builtin::{BuiltinProgram, ProgramReader, open_program};
 use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions};
 use virtual_axes_nc::plan::{FeedPlanError, PartProgramPlanner, PlanOptions};
 
@@ -70,6 +69,12 @@ pub fn scenario_names() -> Vec<&'static str> {
     CoreScenario::builtin_names().collect()
 }
 
+/// Returns the names of the built-in part programs.
+#[pyfunction]
+pub fn nc_program_names() -> Vec<&'static str> {
+    BuiltinProgram::names().collect()
+}
+
 impl PyScenario {
     pub fn program(&self, machine: &PyMachine) -> PyResult<Arc<Program>> {
         self.scenario.program(&machine.config, self.feed).map(Arc::new).map_err(value_error)
@@ -87,6 +92,9 @@ impl PyScenario {
     #[staticmethod]
     #[pyo3(signature = (name_or_path, feed = None))]
     fn load(name_or_path: &str, feed: Option<f64>) -> PyResult<Self> {
+        if BuiltinProgram::find(name_or_path).is_some() {
+            return Err(value_error(format!("{name_or_path}: is a part program; load it with nc_program")));
+        }
         Ok(PyScenario { scenario: CoreScenario::load(name_or_path).map_err(value_error)?, feed })
     }
 
@@ -125,7 +133,7 @@ pub struct PartProgram {
 
 /// Setpoints of a planner.
 struct PlannedRows {
-    planner: PartProgramPlanner<Interpreter<BufReader<File>>>,
+    planner: PartProgramPlanner<Interpreter<ProgramReader>>,
     path: String,
     feed_override: f64,
 }
@@ -150,9 +158,9 @@ impl GridSource for PlannedRows {
 impl PartProgram {
     pub fn rows(&self, machine: &PyMachine) -> PyResult<Rows> {
         let failed = |error: &dyn std::fmt::Display| value_error(format!("{}: {error}", self.path));
-        let file = File::open(&self.path).map_err(|error| failed(&error))?;
+        let file = open_program(&self.path).map_err(|error| failed(&error))?;
         let options = InterpreterOptions::for_machine(&machine.config);
-        let steps = Interpreter::new(BufReader::new(file), &self.path, options);
+        let steps = Interpreter::new(file, &self.path, options);
         let planner = PartProgramPlanner::new(steps, &machine.config, PlanOptions::default())
             .map_err(|error| failed(&error))?;
         Rows::read(PlannedRows { planner, path: self.path.clone(), feed_override: self.feed_override })
@@ -162,12 +170,12 @@ impl PartProgram {
 #[pymethods]
 impl PartProgram {
     #[staticmethod]
-    #[pyo3(signature = (path, feed_override = 1.0))]
-    fn load(path: String, feed_override: f64) -> PyResult<Self> {
+    #[pyo3(signature = (name_or_path, feed_override = 1.0))]
+    fn load(name_or_path: String, feed_override: f64) -> PyResult<Self> {
         if !(feed_override > 0.0 && feed_override <= 2.0) {
             return Err(value_error(format!("feed_override {feed_override}: must be above 0 and at most 2")));
         }
-        Ok(PartProgram { path, feed_override })
+        Ok(PartProgram { path: name_or_path, feed_override })
     }
 
     #[getter]

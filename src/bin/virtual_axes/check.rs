@@ -12,6 +12,7 @@ use virtual_axes_core::scenario::{Scenario, is_file_name, nearest_input};
 use virtual_axes_core::text::{escaped, nearest_hint};
 use virtual_axes_core::trial::{self, Measures, SetpointSource, Tick, Trial};
 use virtual_axes_io::files::{self, FileKind};
+use virtual_axes_nc::builtin::BuiltinProgram;
 
 use crate::input::CommandInput;
 use crate::limit_audit::{LimitAudit, LimitExcess};
@@ -41,7 +42,7 @@ pub struct CheckArguments {
 /// Validates the file and returns its kind and contents.
 pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
     let name = arguments.file.to_string_lossy();
-    if part_program::is_part_program(&arguments.file) {
+    if part_program::is_part_program(&name) {
         let config = Parameters::load(&arguments.machine)?.machine_config()?;
         return part_program(arguments, &name, &config);
     }
@@ -158,9 +159,9 @@ fn part_program(
     machine: &MachineConfig,
 ) -> Result<String, Box<dyn Error>> {
     let ignored = &arguments.part_program.ignore;
-    let lines = part_program::count_lines(&arguments.file).map_err(|error| format!("{name}: {error}"))?;
+    let lines = part_program::count_lines(name).map_err(|error| format!("{name}: {error}"))?;
     let mut progress = TrialProgress::with_lines(name, lines, arguments.json);
-    let mut summary = part_program::check(&arguments.file, machine, ignored, &mut progress)?;
+    let mut summary = part_program::check(name, machine, ignored, &mut progress)?;
     let input = CommandInput::open(name, None)?.with_part_program(&arguments.part_program)?;
     let SetpointSource::Grid(mut source) = input.setpoints(machine, None)? else {
         return Err(format!("{name}: a part program without setpoints").into());
@@ -230,7 +231,7 @@ impl AuditedInput<'_> {
 /// Returns true for a built-in machine, false for a built-in scenario.
 fn is_shipped_machine(name: &str) -> Result<bool, String> {
     let machines: Vec<&str> = Parameters::builtin_names().collect();
-    let scenarios: Vec<&str> = Scenario::builtin_names().collect();
+    let scenarios: Vec<&str> = Scenario::builtin_names().chain(BuiltinProgram::names()).collect();
     let machine = machines.contains(&name);
     match machine || scenarios.contains(&name) {
         true => Ok(machine),

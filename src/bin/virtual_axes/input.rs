@@ -14,7 +14,7 @@ use crate::print_error;
 use crate::progress::TrialProgress;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::path::Program;
-use virtual_axes_core::scenario::Scenario;
+use virtual_axes_core::scenario::{Scenario, ScenarioError, nearest_input};
 use virtual_axes_core::simulation::joint_limits;
 use virtual_axes_core::trajectory::TrajectoryRequest;
 use virtual_axes_core::trial::{GridSource, ProgramSource, SetpointSource, SourceError, TrialError};
@@ -22,6 +22,7 @@ use virtual_axes_core::units::Rounded;
 use virtual_axes_io::files::{
     self, FileKind, McapTrajectories, PsecCsvReader, PsecRow, TimeGap, read_psec_yaml,
 };
+use virtual_axes_nc::builtin::BuiltinProgram;
 
 /// Scenario, part program or file with setpoints.
 #[derive(Debug)]
@@ -56,11 +57,12 @@ impl CommandInput {
     /// Returns an error if the file cannot be read or is invalid, or if `topic` is given for another kind of
     /// file.
     pub fn open(name: &str, topic: Option<&str>) -> Result<Self, Box<dyn Error>> {
-        let is_builtin = Scenario::builtin_names().any(|known| known == name);
-        let content = if is_builtin || !Path::new(name).exists() {
+        let is_scenario = Scenario::builtin_names().any(|known| known == name);
+        let is_program = BuiltinProgram::find(name).is_some();
+        let content = if is_scenario || (!is_program && !Path::new(name).exists()) {
             // The error of an unknown name lists the built-in scenarios.
-            Content::Scenario(Box::new(Scenario::load(name)?))
-        } else if is_part_program(Path::new(name)) {
+            Content::Scenario(Box::new(Scenario::load(name).map_err(with_programs)?))
+        } else if is_part_program(name) {
             Content::PartProgram
         } else {
             content_of(files::Input::open(Path::new(name))?, topic)?
@@ -130,7 +132,7 @@ impl CommandInput {
         if !self.is_part_program() {
             return Ok(TrialProgress::new(&self.name, duration, is_quiet));
         }
-        let lines = count_lines(Path::new(&self.name)).map_err(|error| format!("{}: {error}", self.name))?;
+        let lines = count_lines(&self.name).map_err(|error| format!("{}: {error}", self.name))?;
         Ok(TrialProgress::with_lines(&self.name, lines, is_quiet))
     }
 
@@ -151,6 +153,9 @@ impl CommandInput {
     pub fn description(&self) -> &str {
         match &self.content {
             Content::Scenario(scenario) => scenario.description(),
+            Content::PartProgram => {
+                BuiltinProgram::find(&self.name).map_or("", |program| program.description)
+            }
             _ => "",
         }
     }
@@ -188,7 +193,10 @@ impl CommandInput {
     ) -> Result<Option<Arc<Program>>, Box<dyn Error>> {
         match &self.content {
             Content::Scenario(scenario) => Ok(Some(Arc::new(scenario.program(machine, feed)?))),
-            _ if feed.is_some() => Err(format!("{}: --feed requires a scenario", self.name).into()),
+            _ if feed.is_some() => {
+                Err(format!("{}: --feed requires a scenario file; a part program has --override", self.name)
+                    .into())
+            }
             _ => Ok(None),
         }
     }
@@ -243,6 +251,17 @@ impl CommandInput {
             error => format!("{}: {error}", self.name).into(),
         }
     }
+}
+
+/// Adds the built-in part programs to the error of a name that is not known.
+pub fn with_programs(mut error: ScenarioError) -> ScenarioError {
+    if let ScenarioError::Unknown { name, nearest, known, .. } = &mut error {
+        *nearest = nearest_input(name, Scenario::builtin_names().chain(BuiltinProgram::names()));
+        if !known.is_empty() {
+            known.push_str(&BuiltinProgram::names().map(|name| format!(", {name}")).collect::<String>());
+        }
+    }
+    error
 }
 
 /// Rejects an output file that is the same file as `input`.

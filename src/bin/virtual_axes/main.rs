@@ -101,7 +101,7 @@ enum Command {
         #[arg(long, value_name = "MACHINE", conflicts_with = "json")]
         show: Option<String>,
     },
-    /// List the built-in scenarios.
+    /// List the built-in scenarios and part programs.
     Scenarios {
         /// Print a JSON list.
         #[arg(long)]

@@ -2,13 +2,13 @@
 
 use std::error::Error;
 use std::f64::consts::FRAC_PI_2;
-use std::fs::File;
-use std::io::{self, BufRead, BufReader};
+use std::io::{self, BufRead};
 use std::path::Path;
 
 use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_core::text::escaped;
 use virtual_axes_core::units::{MILLIMETER, Rounded, position_text};
+use virtual_axes_nc::builtin::{BuiltinProgram, open_program};
 use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions, TipTransform};
 use virtual_axes_nc::motion::{Coordinates, Feed, MotionKind, ProgramEvent, ProgramMotion, ProgramStep};
 
@@ -23,19 +23,20 @@ const SAMPLES: u32 = 32;
 /// Distance beyond a travel limit that is the rounding of a program, m or rad.
 const ROUNDING: f64 = 1e-9;
 
-/// Returns true for a file with the extension of a part program.
-pub fn is_part_program(file: &Path) -> bool {
-    let extension = file.extension().and_then(|extension| extension.to_str());
-    extension.is_some_and(|extension| EXTENSIONS.iter().any(|known| extension.eq_ignore_ascii_case(known)))
+/// Returns true for a built-in part program and for a file with the extension of one.
+pub fn is_part_program(name: &str) -> bool {
+    let extension = Path::new(name).extension().and_then(|extension| extension.to_str());
+    let is_known = |extension: &str| EXTENSIONS.iter().any(|known| extension.eq_ignore_ascii_case(known));
+    BuiltinProgram::find(name).is_some() || extension.is_some_and(is_known)
 }
 
-/// Returns the number of lines of a file.
+/// Returns the number of lines of a part program.
 ///
 /// # Errors
 ///
 /// Returns an error of the operating system.
-pub fn count_lines(file: &Path) -> io::Result<u64> {
-    let mut reader = BufReader::new(File::open(file)?);
+pub fn count_lines(name: &str) -> io::Result<u64> {
+    let mut reader = open_program(name)?;
     let (mut lines, mut is_open) = (0, false);
     loop {
         let bytes = reader.fill_buf()?;
@@ -49,18 +50,17 @@ pub fn count_lines(file: &Path) -> io::Result<u64> {
 
 /// Validates words, axes and travel limits of a part program on a machine and returns a summary.
 pub fn check(
-    file: &Path,
+    name: &str,
     machine: &MachineConfig,
     ignored: &[u32],
     progress: &mut TrialProgress,
 ) -> Result<String, Box<dyn Error>> {
-    let name = file.to_string_lossy();
-    let source = BufReader::new(File::open(file).map_err(|error| format!("{name}: {error}"))?);
+    let source = open_program(name).map_err(|error| format!("{name}: {error}"))?;
     let mut options = InterpreterOptions::for_machine(machine);
     options.ignored_m_codes = ignored.to_vec();
     let transform = TipTransform::new(machine);
     let mut summary = ProgramSummary::new(&transform.joints(&options.start, None));
-    let mut steps = Interpreter::new(source, &escaped(&name), options);
+    let mut steps = Interpreter::new(source, &escaped(name), options);
     while let Some(step) = steps.next() {
         interrupt::check()?;
         progress.set_line(steps.line());
@@ -69,7 +69,7 @@ pub fn check(
                 summary.add(&motion, &transform);
                 summary
                     .require_travel(machine, &motion)
-                    .map_err(|error| format!("{}:{error}", escaped(&name)))?;
+                    .map_err(|error| format!("{}:{error}", escaped(name)))?;
             }
             ProgramStep::Event { event: ProgramEvent::Dwell(time), .. } => summary.time += time,
             ProgramStep::Event { .. } => {}

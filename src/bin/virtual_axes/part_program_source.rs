@@ -3,12 +3,11 @@
 use std::cell::RefCell;
 use std::collections::{BTreeMap, VecDeque};
 use std::error::Error;
-use std::fs::File;
-use std::io::BufReader;
 
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::trial::{GridSource, SourceError};
 use virtual_axes_core::units::{Nanoseconds, seconds};
+use virtual_axes_nc::builtin::{ProgramReader, open_program};
 use virtual_axes_nc::interpret::{IgnoredCode, Interpreter, InterpreterOptions, ProgramError};
 use virtual_axes_nc::motion::{Blend, PathControl, ProgramEvent, ProgramStep};
 use virtual_axes_nc::plan::{FeedPlanError, PartProgramPlanner, PlanOptions};
@@ -110,7 +109,7 @@ impl ProgramTrack {
 
 /// Steps of a program that notes words without effect in its track.
 struct NotedSteps<'a> {
-    interpreter: Interpreter<BufReader<File>>,
+    interpreter: Interpreter<ProgramReader>,
     track: &'a RefCell<ProgramTrack>,
 }
 
@@ -162,11 +161,11 @@ impl<'a> PartProgramSource<'a> {
         options: &'a PartProgramOptions,
         track: &'a RefCell<ProgramTrack>,
     ) -> Result<Self, Box<dyn Error>> {
-        let file = File::open(name).map_err(|error| format!("{name}: {error}"))?;
+        let file = open_program(name).map_err(|error| format!("{name}: {error}"))?;
         let mut interpreter = InterpreterOptions::for_machine(machine);
         interpreter.ignored_m_codes.clone_from(&options.ignored_m_codes);
         track.replace(ProgramTrack::default());
-        let interpreter = Interpreter::new(BufReader::new(file), name, interpreter);
+        let interpreter = Interpreter::new(file, name, interpreter);
         let planner = PartProgramPlanner::new(NotedSteps { interpreter, track }, machine, options.plan)
             .map_err(|error| format!("{name}: {error}"))?;
         Ok(Self {

@@ -37,7 +37,7 @@ enum PsecKind {
 /// Arguments of `virtual_axes psec` for a scenario.
 #[derive(Debug, clap::Args)]
 struct ScenarioPsecArguments {
-    /// Built-in scenario, scenario file or part program (`.nc`, `.ngc`, …).
+    /// Built-in scenario or part program, scenario file, or part program file (`.nc`, `.ngc`, …).
     scenario: String,
     /// Output file: CSV (`time,x,y,…` in s, m, rad), MCAP with a JointTrajectory on `/psec`, or YAML for
     /// `ros2 topic pub`.

@@ -40,8 +40,8 @@ impl MachineArguments {
 /// Setpoints, machine and parameters.
 #[derive(Debug, clap::Args)]
 pub struct TrialArguments {
-    /// Built-in scenario, scenario file, part program (`.nc`, `.ngc`, …), or file with setpoints: CSV (`time,x,y,…` in s,
-    /// m, rad), MCAP with a JointTrajectory, or YAML for `ros2 topic pub`.
+    /// Built-in scenario or part program, scenario file, part program file (`.nc`, `.ngc`, …), or file with setpoints:
+    /// CSV (`time,x,y,…` in s, m, rad), MCAP with a JointTrajectory, or YAML for `ros2 topic pub`.
     #[arg(value_name = "SCENARIO|FILE")]
     input: String,
     /// Built-in machine or machine file.

@@ -1,8 +1,7 @@
 //! Lines of a part program with the largest contour errors.
 
 use std::collections::VecDeque;
-use std::fs::File;
-use std::io::{self, BufRead, BufReader};
+use std::io::{self, BufRead};
 
 use nalgebra::Vector3;
 use serde_json::{Value, json};
@@ -11,6 +10,7 @@ use virtual_axes_core::kinematics::{Kinematics, ToolPose};
 use virtual_axes_core::text::escaped;
 use virtual_axes_core::trial::Tick;
 use virtual_axes_core::units::{MILLIDEGREE, Nanoseconds, seconds};
+use virtual_axes_nc::builtin::open_program;
 use virtual_axes_report::{Section, Table, TableColumn};
 
 use crate::feed_along_path::FeedAlongPath;
@@ -351,7 +351,7 @@ impl LineErrors {
         self.explain(0);
         let mut worst: Vec<WorstLine> = self.worst.into_iter().map(|(worst, _)| worst).collect();
         let last = worst.iter().map(|worst| worst.line).max().unwrap_or(0);
-        for (i, text) in BufReader::new(File::open(name)?).split(b'\n').take(last).enumerate() {
+        for (i, text) in open_program(name)?.split(b'\n').take(last).enumerate() {
             let text = text?;
             for worst in worst.iter_mut().filter(|worst| worst.line == i + 1) {
                 worst.text = String::from_utf8_lossy(&text).trim().chars().take(TEXT).collect();

@@ -1,11 +1,12 @@
 //! Text of a part program: a file, or the text of a goal.
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
+use std::io::{BufReader, Cursor};
 use std::os::unix::fs::OpenOptionsExt;
 use std::time::Duration;
 
 use virtual_axes_core::text::escaped;
+use virtual_axes_nc::builtin::{BuiltinProgram, ProgramReader};
 
 /// Largest file, bytes.
 const MAX_FILE: u64 = 1 << 32;
@@ -22,26 +23,22 @@ pub struct ProgramText {
     pub reader: ProgramReader,
 }
 
-/// Reader of a part program.
-pub enum ProgramReader {
-    /// File.
-    File(BufReader<File>),
-    /// Text of a goal.
-    Text(Cursor<String>),
-}
-
 impl ProgramText {
     /// Creates the source of a text.
     pub fn from_text(text: String) -> Self {
         Self { name: TEXT_NAME.to_owned(), reader: ProgramReader::Text(Cursor::new(text)) }
     }
 
-    /// Opens a file, in at most 5 s.
+    /// Opens the built-in part program `path`, or the file `path` if there is none, in at most 5 s.
     ///
     /// # Errors
-    /// Text that begins with the path, if it is not a regular file of at most 4 GiB that can be read.
+    /// Text that begins with the path, if it is neither a built-in part program nor not a regular file of at most 4 GiB that can be read.
     pub async fn open(path: String) -> Result<Self, String> {
         let name = escaped(&path).to_string();
+        if let Some(program) = BuiltinProgram::find(&path) {
+            let reader = program.reader();
+            return Ok(Self { name, reader });
+        }
         let opened = tokio::task::spawn_blocking(move || open_file(&path));
         let file = match tokio::time::timeout(OPEN_TIMEOUT, opened).await {
             Ok(Ok(opened)) => opened.map_err(|reason| format!("{name}: {reason}"))?,
@@ -64,38 +61,4 @@ fn open_file(path: &str) -> Result<File, String> {
         return Err(format!("has {} bytes; at most {MAX_FILE} are allowed", metadata.len()));
     }
     Ok(file)
-}
-
-impl Read for ProgramReader {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        match self {
-            Self::File(reader) => reader.read(buffer),
-            Self::Text(reader) => reader.read(buffer),
-        }
-    }
-}
-
-impl BufRead for ProgramReader {
-    fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
-        match self {
-            Self::File(reader) => reader.fill_buf(),
-            Self::Text(reader) => reader.fill_buf(),
-        }
-    }
-
-    fn consume(&mut self, amount: usize) {
-        match self {
-            Self::File(reader) => reader.consume(amount),
-            Self::Text(reader) => reader.consume(amount),
-        }
-    }
-}
-
-impl Seek for ProgramReader {
-    fn seek(&mut self, position: SeekFrom) -> std::io::Result<u64> {
-        match self {
-            Self::File(reader) => reader.seek(position),
-            Self::Text(reader) => reader.seek(position),
-        }
-    }
 }

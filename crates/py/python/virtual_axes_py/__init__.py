@@ -15,7 +15,7 @@ The ROS messages of the node are in the module `virtual_axes`, which ROS generat
 from __future__ import annotations
 
 from . import design
-from ._native import PartProgram, Scenario, machine_names, scenario_names
+from ._native import PartProgram, Scenario, machine_names, nc_program_names, scenario_names
 from .chunks import SweepResult
 from .identification import Identification, identify
 from .machine import SIGNALS, Machine
@@ -43,6 +43,7 @@ __all__ = [
     "machine_names",
     "merge",
     "nc_program",
+    "nc_program_names",
     "optimize",
     "random_variants",
     "scenario",
@@ -61,9 +62,9 @@ def scenario(name_or_path: str, feed: float | None = None) -> Scenario:
     return Scenario.load(name_or_path, feed)
 
 
-def nc_program(path: str, feed_override: float = 1.0) -> PartProgram:
-    """Names a part program in G code; it is read and planned when it is simulated.
+def nc_program(name_or_path: str, feed_override: float = 1.0) -> PartProgram:
+    """Names a part program in G code, built in (`nc_program_names()`) or a file; it is read and planned when it is simulated.
 
     `feed_override` is above 0 and at most 2, 1 for the programmed feed. Raises `ValueError` for another one.
     """
-    return PartProgram.load(path, feed_override)
+    return PartProgram.load(name_or_path, feed_override)

@@ -151,7 +151,9 @@ class Machine:
             return psec
         if not isinstance(psec, Mapping):
             if isinstance(psec, str):
-                raise TypeError(f"psec is {psec!r}; a scenario is scenario(name), a part program nc_program(path)")
+                raise TypeError(
+                    f"psec is {psec!r}; a scenario is scenario(name), a part program nc_program(name_or_path)"
+                )
             return self._checked(to_floats("psec", psec))
         unknown = [name for name in psec if name not in self.axes]
         if unknown:
