@@ -88,6 +88,8 @@ def test_a_trajectory_on_the_topic_is_executed_and_shown(drive: AxesClient) -> N
     drive.send(joint_trajectory(["x", "y"], [0, 30], [[0.02, 0], [0.1, 0.1]]))
     stop = drive.send(JointTrajectory(joint_names=["x"]))
     assert drive.end(stop, 20).status == R.COMPLETED
+    # The result may arrive before the last sample of the stop.
+    drive.wait_until(drive.now() + 2 * TSP_NS, 10)
     before = drive.latest("psec")
     drive.wait_until(drive.now() + 20 * TSP_NS, 10)
     after = drive.latest("psec")

@@ -248,7 +248,8 @@ def scenarios() -> str:
         "Scenarios",
         "Built-in motions and part programs for `virtual_axes run`, `tune`, `robustness` and `psec`. "
         "`virtual_axes scenarios --show NAME` prints one as a template for your own; [File formats](file-formats.md) "
-        "describes the keys, [Part programs](part-programs.md) the G code. The column of the source names the figure or section of Prévost, Lavernhe, Lartigue and "
+        "describes the keys, [Part programs](part-programs.md) the G code. The column of the source names the "
+        "figure or section of Prévost, Lavernhe, Lartigue and "
         "Dumur.",
         table(["scenario", "motion", "source"], rows),
     )

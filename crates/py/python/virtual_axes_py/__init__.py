@@ -63,8 +63,9 @@ def scenario(name_or_path: str, feed: float | None = None) -> Scenario:
 
 
 def nc_program(name_or_path: str, feed_override: float = 1.0) -> PartProgram:
-    """Names a part program in G code, built in (`nc_program_names()`) or a file; it is read and planned when it is simulated.
+    """Names a part program in G code: a built-in one (`nc_program_names()`) or a file.
 
+    It is read and planned when it is simulated.
     `feed_override` is above 0 and at most 2, 1 for the programmed feed. Raises `ValueError` for another one.
     """
     return PartProgram.load(name_or_path, feed_override)
