@@ -219,6 +219,9 @@ def test_margins_and_poles_equal_those_of_python_control(machine: va.Machine) ->
         assert found.gain == pytest.approx(gain, rel=1e-9), (axis, checked)
         assert found.phase == pytest.approx(np.radians(phase), rel=1e-9), (axis, checked)
         assert found.modulus == pytest.approx(modulus_margin(loop), rel=1e-9), (axis, checked)
+        _, phases, _, _, crossovers, _ = control.stability_margins(loop, returnall=True)
+        delays = np.radians(phases % 360) / crossovers
+        assert found.delay == pytest.approx(min(delays, default=np.inf), rel=1e-9), (axis, checked)
         closed = np.sort(np.abs(control.feedback(loop, 1).poles()))[::-1]
         ours = np.sort(np.abs(va.design.poles(model, rst)))[::-1]
         # Leading poles: those near 0 are ill-conditioned in either library.

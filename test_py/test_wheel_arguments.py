@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+
+import copy
 import multiprocessing
 import pickle
 import signal
@@ -105,6 +107,26 @@ def test_models_and_controllers_can_be_pickled(machine: va.Machine) -> None:
     with pytest.raises(ValueError) as found:
         machine.with_({"x.position_loop.gain": -1.0})
     assert pickle.loads(pickle.dumps(found.value)).args == found.value.args
+
+
+@pytest.mark.parametrize("machines", [1, 3])
+def test_a_stepper_goes_on_with_the_same_bits_after_pickling(machine: va.Machine, machines: int) -> None:
+    changed = machine.with_({"x.position_loop.gain": 2.0, "y.position_loop.controller": "gpc"})
+    stepper = va.Stepper(machine, machines)
+    rows = va.scenario("ballbar").psec(machine)[:300]
+
+    def run(which: va.Stepper, some: np.ndarray) -> np.ndarray:
+        return np.array([which.step(np.broadcast_to(row, (machines, 5)).squeeze()) for row in some])
+
+    run(stepper, rows[:100])
+    stepper.set_machine(changed)
+    run(stepper, rows[100:200])
+    copies = [pickle.loads(pickle.dumps(stepper)), copy.deepcopy(stepper), va.Stepper(machine, machines)]
+    copies[2].restore(pickle.loads(pickle.dumps(stepper.save())))
+    expected = run(stepper, rows[200:])
+    for one in copies:
+        assert one.time == pytest.approx(1.2) and one.machines == machines
+        assert np.array_equal(run(one, rows[200:]), expected)
 
 
 def final_position(machine: va.Machine) -> list[float]:

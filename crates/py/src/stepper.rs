@@ -5,6 +5,8 @@ use std::sync::Arc;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use virtual_axes_core::config::Parameters;
 use virtual_axes_core::machine::{AxisSample, Machine as CoreMachine, MachineParameters};
 use virtual_axes_core::units::seconds;
 
@@ -13,10 +15,18 @@ use crate::machine::PyMachine;
 
 /// Machines from which on a step releases the global interpreter lock.
 const RELEASING: usize = 16;
+/// Most machines of a stepper.
+const MOST: usize = 100_000;
+
+/// Function that creates an object again, and its arguments: parameters as YAML, number of machines, and state.
+type Recreation<'py> = (Bound<'py, PyAny>, (String, usize, Bound<'py, PyBytes>));
 
 /// Simulation of one or several equal machines, stepped by position cycles.
 #[pyclass(module = "virtual_axes_py._native")]
+#[derive(Clone)]
 pub struct Stepper {
+    /// Parameters of one machine.
+    parameters: Parameters,
     machine: CoreMachine,
     /// Axes of one machine.
     axes: usize,
@@ -25,17 +35,39 @@ pub struct Stepper {
 
 /// State of a [`Stepper`] to return to.
 #[pyclass(module = "virtual_axes_py._native", frozen)]
-pub struct StepperState {
-    machine: CoreMachine,
-    axes: usize,
+pub struct StepperState(Stepper);
+
+/// Returns the parameters of a number of equal machines.
+fn repeated(machine: &PyMachine, machines: usize) -> PyResult<Arc<MachineParameters>> {
+    if machines == 1 {
+        return Ok(Arc::clone(&machine.discretized));
+    }
+    if !(1..=MOST).contains(&machines) {
+        return Err(value_error(format!("machines {machines}: must be from 1 to {MOST}")));
+    }
+    let copies = vec![Arc::clone(&machine.discretized); machines];
+    MachineParameters::concatenate(&copies)
+        .map(Arc::new)
+        .ok_or_else(|| value_error("a stepper needs at least one machine"))
 }
 
 impl Stepper {
-    fn repeated(&self, machine: &PyMachine) -> PyResult<Arc<MachineParameters>> {
-        let copies = vec![Arc::clone(&machine.discretized); self.machines];
-        MachineParameters::concatenate(&copies)
-            .map(Arc::new)
-            .ok_or_else(|| value_error("a stepper needs at least one machine"))
+    /// Returns the arguments of [`Self::from_bytes`].
+    fn to_bytes<'py>(&self, py: Python<'py>) -> (String, usize, Bound<'py, PyBytes>) {
+        let state = PyBytes::new(py, &self.machine.state_bytes());
+        (self.parameters.to_yaml("", |_| None), self.machines, state)
+    }
+
+    /// Creates a stepper from parameters as YAML, the number of machines and their state.
+    fn from_bytes(parameters: &str, machines: usize, state: &[u8]) -> PyResult<Self> {
+        let machine = PyMachine::new(Parameters::from_yaml(parameters, "state").map_err(value_error)?)?;
+        let parameters = repeated(&machine, machines)?;
+        Ok(Stepper {
+            machine: CoreMachine::from_state_bytes(parameters, state).map_err(value_error)?,
+            axes: machine.config.axes().len(),
+            parameters: machine.parameters,
+            machines,
+        })
     }
 
     /// Returns the values of an array with one value per axis of each machine.
@@ -82,19 +114,21 @@ impl Stepper {
     #[new]
     #[pyo3(signature = (machine, machines = 1))]
     fn new(machine: &PyMachine, machines: usize) -> PyResult<Self> {
-        const MOST: usize = 100_000;
-        if !(1..=MOST).contains(&machines) {
-            return Err(value_error(format!("machines {machines}: must be from 1 to {MOST}")));
-        }
-        let mut stepper = Stepper {
-            machine: CoreMachine::new(Arc::clone(&machine.discretized)),
+        Ok(Stepper {
+            parameters: machine.parameters.clone(),
+            machine: CoreMachine::new(repeated(machine, machines)?),
             axes: machine.config.axes().len(),
             machines,
-        };
-        if machines > 1 {
-            stepper.machine = CoreMachine::new(stepper.repeated(machine)?);
-        }
-        Ok(stepper)
+        })
+    }
+
+    #[staticmethod]
+    fn load(parameters: &str, machines: usize, state: &[u8]) -> PyResult<Self> {
+        Stepper::from_bytes(parameters, machines, state)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Recreation<'py>> {
+        Ok((slf.get_type().getattr("load")?, slf.borrow().to_bytes(slf.py())))
     }
 
     #[pyo3(signature = (psec, preview = None))]
@@ -175,19 +209,22 @@ impl Stepper {
     }
 
     fn set_machine(&mut self, machine: &PyMachine) -> PyResult<()> {
-        let parameters = self.repeated(machine)?;
-        self.machine.update_parameters(parameters).map_err(value_error)
+        let parameters = repeated(machine, self.machines)?;
+        self.machine.update_parameters(parameters).map_err(value_error)?;
+        self.parameters = machine.parameters.clone();
+        Ok(())
     }
 
     fn save(&self) -> StepperState {
-        StepperState { machine: self.machine.clone(), axes: self.axes }
+        StepperState(self.clone())
     }
 
     fn restore(&mut self, state: &StepperState) -> PyResult<()> {
-        if state.machine.axis_count() != self.machine.axis_count() || state.axes != self.axes {
+        let StepperState(saved) = state;
+        if (saved.machines, saved.axes) != (self.machines, self.axes) {
             return Err(value_error("the state is that of another number of machines or axes"));
         }
-        self.machine = state.machine.clone();
+        self.clone_from(saved);
         Ok(())
     }
 
@@ -242,5 +279,17 @@ impl Stepper {
     #[getter]
     fn preview_length(&self) -> usize {
         self.machine.preview_length()
+    }
+}
+
+#[pymethods]
+impl StepperState {
+    #[staticmethod]
+    fn load(parameters: &str, machines: usize, state: &[u8]) -> PyResult<Self> {
+        Stepper::from_bytes(parameters, machines, state).map(StepperState)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Recreation<'py>> {
+        Ok((slf.get_type().getattr("load")?, slf.get().0.to_bytes(slf.py())))
     }
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +30,16 @@ class Stepper:
     def __init__(self, machine: Machine, machines: int = 1) -> None:
         """Creates machines at rest at home, 0 on every axis; raises `ValueError` unless there are 1 to 100,000."""
         self._native = _native.Stepper(to_native(machine), to_whole("machines", machines, 1, 100_000))
+
+    @classmethod
+    def _of_native(cls, native: _native.Stepper) -> Stepper:
+        stepper = cls.__new__(cls)
+        stepper._native = native
+        return stepper
+
+    def __reduce__(self) -> tuple[Callable[[_native.Stepper], Stepper], tuple[_native.Stepper]]:
+        """Pickles machine and state: the copy goes on with the same bits."""
+        return Stepper._of_native, (self._native,)
 
     def step(self, psec: ArrayLike, preview: ArrayLike | None = None) -> NDArray[np.float64]:
         """Advances by one position cycle and returns the positions at its end, m or rad.
@@ -71,11 +81,11 @@ class Stepper:
         self._native.set_machine(to_native(machine))
 
     def save(self) -> _native.StepperState:
-        """Returns a copy of the state for `restore`."""
+        """Returns a copy of the state for `restore`; it can be pickled."""
         return self._native.save()
 
     def restore(self, state: _native.StepperState) -> None:
-        """Returns to a saved state; raises `ValueError` if it has another number of machines or axes."""
+        """Returns to a saved state and its parameters; raises `ValueError` if it has another number of machines or axes."""
         self._native.restore(state)
 
     @property
