@@ -85,7 +85,10 @@ class Stepper:
         return self._native.save()
 
     def restore(self, state: _native.StepperState) -> None:
-        """Returns to a saved state and its parameters; raises `ValueError` if it has another number of machines or axes."""
+        """Returns to a saved state and its parameters.
+
+        Raises `ValueError` if it has another number of machines or axes.
+        """
         self._native.restore(state)
 
     @property
