@@ -35,6 +35,7 @@ LAYERS: dict[str, set[str]] = {
     "virtual_axes_identify": FILES_AND_NETWORK | {"cdr-encoding", "quick-xml"},
     "virtual_axes_nc": FILES_AND_NETWORK | {"cdr-encoding", "quick-xml", "serde_json"},
     "virtual_axes_c": FILES_AND_NETWORK | {"cdr-encoding", "quick-xml", "serde_json"},
+    "virtual_axes_fmu": FILES_AND_NETWORK | {"cdr-encoding", "quick-xml", "serde_json"},
     "virtual_axes_io": FILES_AND_NETWORK - {"mcap"},
     "virtual_axes_report": FILES_AND_NETWORK,
     "virtual_axes_py": FILES_AND_NETWORK - {"mcap"},

@@ -10,6 +10,7 @@ mod check;
 mod design;
 mod design_output;
 mod feed_along_path;
+mod fmu;
 mod identify;
 mod identify_columns;
 mod identify_result;
@@ -90,6 +91,8 @@ enum Command {
     Check(check::CheckArguments),
     /// Print the URDF of a machine, for robot_state_publisher and RViz.
     Urdf(urdf::UrdfArguments),
+    /// Write a machine as an FMU (FMI 2.0 co-simulation), for Simulink, OpenModelica and other importers.
+    Fmu(fmu::FmuArguments),
     /// Print the tool pose in the workpiece frame for joint positions (forward kinematics).
     Pose(pose::PoseArguments),
     /// List the built-in machines.
@@ -190,6 +193,7 @@ fn run_command(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Identify(arguments) => identify::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Urdf(arguments) => urdf::run(arguments),
+        Command::Fmu(arguments) => fmu::run(arguments),
         Command::Pose(arguments) => pose::run(arguments),
         Command::Machines { show: Some(name), .. } => list::machine(name),
         Command::Machines { json, show: None } => list::machines(*json),

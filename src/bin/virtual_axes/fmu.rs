@@ -1,0 +1,146 @@
+//! `virtual_axes fmu`: a machine as an FMU, for importers of FMI 2.0 co-simulation.
+
+use std::error::Error;
+use std::fs;
+use std::io::{Cursor, Write};
+use std::path::{Path, PathBuf};
+
+use virtual_axes_fmu::{MACHINE_FILE, MODEL_IDENTIFIER, model_description};
+use virtual_axes_io::files::OutputFile;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
+
+use crate::input::must_not_replace;
+use crate::trial_arguments::MachineArguments;
+
+/// Name that the library of an FMU exports.
+const EXPORTED: &[u8] = b"fmi2DoStep";
+
+/// Arguments of `virtual_axes fmu`.
+#[derive(Debug, clap::Args)]
+pub struct FmuArguments {
+    #[command(flatten)]
+    machine: MachineArguments,
+    /// Output file, for example `axes.fmu`.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Library of the FMU, built by `cargo build --release -p virtual_axes_fmu`; can be repeated for several platforms
+    /// [default: the one beside this program].
+    #[arg(long, value_name = "FILE")]
+    library: Vec<PathBuf>,
+}
+
+/// Writes the archive and returns an empty text.
+pub fn run(arguments: &FmuArguments) -> Result<String, Box<dyn Error>> {
+    let machine = &arguments.machine;
+    let text = machine.parameters()?.to_yaml("", |_| None);
+    let description = model_description(&text).map_err(|error| format!("{}: {error}", machine.name()))?;
+    machine.must_not_be(&arguments.out)?;
+    let found = if arguments.library.is_empty() { vec![own_library()?] } else { arguments.library.clone() };
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+    archive.start_file("modelDescription.xml", options)?;
+    archive.write_all(description.as_bytes())?;
+    archive.start_file(format!("resources/{MACHINE_FILE}"), options)?;
+    archive.write_all(text.as_bytes())?;
+    let mut platforms: Vec<&str> = Vec::new();
+    for path in &found {
+        must_not_replace(&arguments.out, path)?;
+        let content = fs::read(path).map_err(|error| format!("library {}: {error}", path.display()))?;
+        let (platform, extension) =
+            platform(&content).map_err(|reason| format!("library {}: {reason}", path.display()))?;
+        if platforms.contains(&platform) {
+            return Err(format!("library {}: there is one for {platform} already", path.display()).into());
+        }
+        platforms.push(platform);
+        archive.start_file(
+            format!("binaries/{platform}/{MODEL_IDENTIFIER}.{extension}"),
+            options.unix_permissions(0o755),
+        )?;
+        archive.write_all(&content)?;
+    }
+    let mut file = OutputFile::create(&arguments.out)?;
+    file.write_all(&archive.finish()?.into_inner())?;
+    file.finish()?;
+    Ok(String::new())
+}
+
+/// Returns the library beside this program, where cargo builds or a package installs it.
+fn own_library() -> Result<PathBuf, String> {
+    let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    let name = format!("{prefix}{MODEL_IDENTIFIER}{suffix}");
+    let program = std::env::current_exe().map_err(|error| format!("path of this program: {error}"))?;
+    let folder = program.parent().unwrap_or(Path::new("."));
+    [folder.join(&name), folder.join("deps").join(&name)].into_iter().find(|path| path.is_file()).ok_or_else(
+        || {
+            format!(
+                "{name} is not beside this program in {}; build it by `cargo build --release -p virtual_axes_fmu` \
+                 or name it by --library",
+                folder.display()
+            )
+        },
+    )
+}
+
+/// Returns the folder of FMI 2.0 for a library, and the extension of its name.
+fn platform(library: &[u8]) -> Result<(&'static str, &'static str), String> {
+    let half = |offset: usize| {
+        let bytes = library.get(offset..)?.first_chunk()?;
+        Some(u16::from_le_bytes(*bytes))
+    };
+    let word = |offset: usize| {
+        let bytes = library.get(offset..)?.first_chunk()?;
+        Some(u32::from_le_bytes(*bytes))
+    };
+    let found = if library.starts_with(b"\x7fELF\x02\x01") {
+        match half(18) {
+            Some(62) => Some(("linux64", "so")),
+            Some(183) => Some(("aarch64-linux", "so")),
+            _ => None,
+        }
+    } else if library.starts_with(b"MZ") {
+        let header = word(60).map_or(0, |offset| offset as usize);
+        (half(header.saturating_add(4)) == Some(0x8664)).then_some(("win64", "dll"))
+    } else {
+        (word(0) == Some(0xfeed_facf)).then_some(("darwin64", "dylib"))
+    };
+    let found =
+        found.ok_or("it is no shared library of Linux, Windows or macOS for 64-bit x86 or ARM processors")?;
+    if !library.windows(EXPORTED.len()).any(|window| window == EXPORTED) {
+        return Err("it exports no fmi2DoStep; it must be that of virtual_axes_fmu".to_owned());
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::platform;
+
+    fn library(head: &[u8], at: usize, machine: u16) -> Vec<u8> {
+        let mut bytes = vec![0; 200];
+        bytes[..head.len()].copy_from_slice(head);
+        bytes[at..at + 2].copy_from_slice(&machine.to_le_bytes());
+        bytes.extend(b"fmi2DoStep");
+        bytes
+    }
+
+    #[test]
+    fn the_head_of_a_library_decides_its_folder() {
+        let mut windows = library(b"MZ", 104, 0x8664);
+        windows[60] = 100;
+        assert_eq!(platform(&windows), Ok(("win64", "dll")));
+        assert_eq!(platform(&library(b"\x7fELF\x02\x01", 18, 62)), Ok(("linux64", "so")));
+        assert_eq!(platform(&library(b"\x7fELF\x02\x01", 18, 183)), Ok(("aarch64-linux", "so")));
+        assert_eq!(platform(&library(&0xfeed_facf_u32.to_le_bytes(), 100, 0)), Ok(("darwin64", "dylib")));
+    }
+
+    #[test]
+    fn other_files_are_rejected() {
+        for bytes in [&b""[..], b"MZ", b"\x7fELF\x02\x01", b"text fmi2DoStep"] {
+            assert!(platform(bytes).is_err_and(|error| error.contains("shared library")), "{bytes:?}");
+        }
+        let mut foreign = library(b"\x7fELF\x02\x01", 18, 62);
+        foreign.truncate(200);
+        assert!(platform(&foreign).is_err_and(|error| error.contains("fmi2DoStep")));
+    }
+}
