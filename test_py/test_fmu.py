@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -171,6 +172,7 @@ def test_a_predictive_controller_reads_the_preview(tmp_path: Path) -> None:
     trace = trace_of(tmp_path, "x-constant", *change)
     psec = trace["x.psec"]
     fmu = write_fmu(tmp_path, *change)
+    assert validate_fmu(str(fmu.file)) == []
     count = sum(name.startswith("x.preview[") for name in fmu.references)
     assert count >= 1
     errors = {}
@@ -338,3 +340,17 @@ def test_a_wrong_library_is_rejected_and_no_archive_is_written(
     )
     assert done.returncode == 2 and str(library) in done.stderr and reason in done.stderr
     assert not out.exists()
+
+
+def test_a_command_without_its_library_names_the_remedy(tmp_path: Path) -> None:
+    command = shutil.copy(COMMAND, tmp_path)
+    arguments = [command, "fmu", "--out", str(tmp_path / "axes.fmu")]
+    done = subprocess.run(arguments, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2 and "libvirtual_axes_fmu.so is not beside this program" in done.stderr
+    assert str(tmp_path) in done.stderr and "--library" in done.stderr
+    library = Path(COMMAND).parent / "deps" / "libvirtual_axes_fmu.so"
+    for added in (["--library", str(library)], []):
+        if not added:
+            shutil.copy(library, tmp_path)
+        subprocess.run([*arguments, *added], check=True, timeout=60)
+        assert validate_fmu(arguments[3]) == []

@@ -84,24 +84,13 @@ fn write_units(out: &mut String, variables: &[FmuVariable]) {
 }
 
 fn write_variable(out: &mut String, reference: usize, variable: &FmuVariable) {
-    let (causality, variability) = match (variable.causality, variable.kind) {
-        (Causality::Input, _) => ("input", "continuous"),
-        (Causality::Output, FmuType::Real) => ("output", "continuous"),
-        (Causality::Output, _) => ("output", "discrete"),
-        (Causality::FixedParameter, _) => ("parameter", "fixed"),
-        (Causality::TunableParameter, _) => ("parameter", "tunable"),
-    };
+    let (causality, variability) = causality(variable);
     let initial = match variable.causality {
         Causality::Input => "",
         Causality::Output => " initial=\"calculated\"",
         Causality::FixedParameter | Causality::TunableParameter => " initial=\"exact\"",
     };
-    let kind = match variable.kind {
-        FmuType::Real => "Real",
-        FmuType::Integer => "Integer",
-        FmuType::Boolean => "Boolean",
-        FmuType::String => "String",
-    };
+    let kind = type_name(variable.kind);
     let mut attributes = String::new();
     if !variable.unit.is_empty() && variable.kind == FmuType::Real {
         let _ = write!(attributes, " unit=\"{}\"", escaped(variable.unit));
@@ -121,7 +110,29 @@ fn write_variable(out: &mut String, reference: usize, variable: &FmuVariable) {
     );
 }
 
-fn start_text(value: &Value) -> String {
+/// Returns causality and variability.
+pub(crate) fn causality(variable: &FmuVariable) -> (&'static str, &'static str) {
+    match (variable.causality, variable.kind) {
+        (Causality::Input, _) => ("input", "continuous"),
+        (Causality::Output, FmuType::Real) => ("output", "continuous"),
+        (Causality::Output, _) => ("output", "discrete"),
+        (Causality::FixedParameter, _) => ("parameter", "fixed"),
+        (Causality::TunableParameter, _) => ("parameter", "tunable"),
+    }
+}
+
+/// Returns the name of a type.
+pub(crate) fn type_name(kind: FmuType) -> &'static str {
+    match kind {
+        FmuType::Real => "Real",
+        FmuType::Integer => "Integer",
+        FmuType::Boolean => "Boolean",
+        FmuType::String => "String",
+    }
+}
+
+/// Returns a start value as text, numbers with all digits.
+pub(crate) fn start_text(value: &Value) -> String {
     match value {
         Value::Double(number) => format!("{number:?}"),
         other => text_value(other),
@@ -129,7 +140,7 @@ fn start_text(value: &Value) -> String {
 }
 
 /// Returns the text of an attribute; characters that XML does not allow are replaced.
-fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for character in text.chars() {
         match character {
@@ -162,4 +173,25 @@ fn is_structured(name: &str) -> bool {
         let is_word = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'_';
         !part.is_empty() && !part.as_bytes()[0].is_ascii_digit() && part.bytes().all(is_word)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn structured_names_are_identifiers_with_dots_and_an_index() {
+        for name in ["x.position", "x_1.preview[12]", "uses_preview"] {
+            assert!(is_structured(name), "{name}");
+        }
+        for name in ["", "x-1.load", "1x.load", "x..load", "ä.load", "x.preview[]", "x.preview[1", "x y.load"]
+        {
+            assert!(!is_structured(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn attributes_have_no_character_that_xml_excludes() {
+        assert_eq!(escaped("a<b>&\"\n\u{1}"), "a&lt;b&gt;&amp;&quot;&#10;\u{fffd}");
+    }
 }

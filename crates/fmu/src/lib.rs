@@ -18,6 +18,7 @@
 
 mod border;
 mod description;
+mod documentation;
 mod functions;
 mod instance;
 mod resources;
@@ -31,6 +32,7 @@ mod variables;
 
 pub use border::{Fmi2Callbacks, Fmi2Logger, Fmi2Status};
 pub use description::{guid, model_description};
+pub use documentation::documentation;
 pub use functions::*;
 pub use instance::FmuInstance;
 pub use signals::{FmuSignal, SIGNALS};

@@ -5,7 +5,7 @@ use std::fs;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
-use virtual_axes_fmu::{MACHINE_FILE, MODEL_IDENTIFIER, model_description};
+use virtual_axes_fmu::{MACHINE_FILE, MODEL_IDENTIFIER, documentation, model_description};
 use virtual_axes_io::files::OutputFile;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
@@ -34,7 +34,9 @@ pub struct FmuArguments {
 pub fn run(arguments: &FmuArguments) -> Result<String, Box<dyn Error>> {
     let machine = &arguments.machine;
     let text = machine.parameters()?.to_yaml("", |_| None);
-    let description = model_description(&text).map_err(|error| format!("{}: {error}", machine.name()))?;
+    let with_name = |error: String| format!("{}: {error}", machine.name());
+    let description = model_description(&text).map_err(with_name)?;
+    let page = documentation(&text).map_err(with_name)?;
     machine.must_not_be(&arguments.out)?;
     let found = if arguments.library.is_empty() { vec![own_library()?] } else { arguments.library.clone() };
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
@@ -43,6 +45,8 @@ pub fn run(arguments: &FmuArguments) -> Result<String, Box<dyn Error>> {
     archive.write_all(description.as_bytes())?;
     archive.start_file(format!("resources/{MACHINE_FILE}"), options)?;
     archive.write_all(text.as_bytes())?;
+    archive.start_file("documentation/index.html", options)?;
+    archive.write_all(page.as_bytes())?;
     let mut platforms: Vec<&str> = Vec::new();
     for path in &found {
         must_not_replace(&arguments.out, path)?;
@@ -71,7 +75,8 @@ fn own_library() -> Result<PathBuf, String> {
     let name = format!("{prefix}{MODEL_IDENTIFIER}{suffix}");
     let program = std::env::current_exe().map_err(|error| format!("path of this program: {error}"))?;
     let folder = program.parent().unwrap_or(Path::new("."));
-    [folder.join(&name), folder.join("deps").join(&name)].into_iter().find(|path| path.is_file()).ok_or_else(
+    // Cargo keeps the one in deps up to date with the program.
+    [folder.join("deps").join(&name), folder.join(&name)].into_iter().find(|path| path.is_file()).ok_or_else(
         || {
             format!(
                 "{name} is not beside this program in {}; build it by `cargo build --release -p virtual_axes_fmu` \
