@@ -6,10 +6,12 @@ import os
 import shutil
 import subprocess
 import sys
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from fmpy.validation import validate_fmu
 
 from documentation.place import Place
 from node_process import node_binary
@@ -63,6 +65,14 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workspace]:
         yield space
     finally:
         space.place.remove()
+
+
+def test_the_installed_command_writes_an_fmu(workspace: Workspace, tmp_path: Path):
+    """The library is installed beside the command."""
+    fmu = tmp_path / "axes.fmu"
+    subprocess.run([workspace.installed / "virtual_axes", "fmu", "--out", fmu], check=True, timeout=60)
+    assert validate_fmu(str(fmu)) == []
+    assert "binaries/linux64/virtual_axes_fmu.so" in zipfile.ZipFile(fmu).namelist()
 
 
 def test_the_installed_package_passes_its_smoke_test(workspace: Workspace):

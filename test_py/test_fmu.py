@@ -6,6 +6,7 @@ import csv
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -310,6 +311,30 @@ def test_instances_and_resets_are_independent(instance: Callable[[], Instance]) 
     one.initialize()
     assert move(one, 0, 30) == wanted
     assert move(other, 30, 5) != wanted[:5]
+
+
+def test_instances_in_several_threads_have_the_same_bits(instance: Callable[[], Instance]) -> None:
+    instances = [instance() for _ in range(4)]
+    for one in instances:
+        one.initialize()
+    with ThreadPoolExecutor(4) as threads:
+        first, *others = threads.map(lambda one: move(one, 0, 300), instances)
+    assert all(found == first for found in others)
+
+
+def test_a_spring_computed_every_half_millisecond_is_overcome(instance: Callable[[], Instance]) -> None:
+    one = instance()
+    one.initialize()
+    one.set("x.setpoint", 0.001)
+    for step in range(2000):
+        (position,) = one.get("x.position")
+        one.set("x.load", -1e6 * position)
+        one.slave.doStep(step * 0.0005, 0.0005)
+    # The velocity controller has an integral part: after a second, no error is left under a force of 1 kN.
+    position, load, error = one.get("x.position", "x.load", "x.following_error")
+    assert position == pytest.approx(0.001, abs=1e-12)
+    assert load == pytest.approx(-1000, abs=0.01) and error == pytest.approx(0, abs=1e-12)
+    assert abs(one.get("x.load_current")[0]) > 1
 
 
 def test_an_instance_of_another_archive_is_rejected(fmu: Fmu, tmp_path: Path) -> None:
