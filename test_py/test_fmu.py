@@ -299,6 +299,27 @@ def test_parameters_have_their_effect_before_and_after_the_start(instance: Calla
     assert move(plain, 40, 40) != move(tuned, 40, 40)
 
 
+def test_an_unstable_combination_is_rejected_until_it_is_changed(instance: Callable[[], Instance]) -> None:
+    one, undisturbed = instance(), instance()
+    for each in (one, undisturbed):
+        each.initialize()
+        move(each, 0, 10)
+    before = one.slave.getFMUstate()
+    loop = "x.position_loop"
+    # Values of one call are checked together.
+    one.slave.setInteger([one.references[f"{loop}.gpc.{name}"] for name in ("n2", "n1", "nu")], [1, 1, 1])
+    one.set(f"{loop}.gpc.lambda_rel", 0.0)
+    one.slave.setString([one.references[f"{loop}.controller"]], ["gpc"])
+    for _ in range(2):
+        with pytest.raises(FMICallException):
+            one.slave.doStep(10 * TSP, TSP)
+        assert one.messages[-1].startswith("axis x: position_loop: the closed loop is unstable")
+    one.slave.setString([one.references[f"{loop}.controller"]], ["cascade"])
+    move(one, 10, 5)
+    one.slave.setFMUstate(before)
+    assert move(one, 10, 30) == move(undisturbed, 10, 30)
+
+
 def test_instances_and_resets_are_independent(instance: Callable[[], Instance]) -> None:
     one, other = instance(), instance()
     for each in (one, other):

@@ -53,7 +53,7 @@ fn measure(
     outputs: &[c_uint],
     period: f64,
 ) -> Result<Vec<f64>, Box<dyn std::error::Error>> {
-    let identifier = CString::new(guid(machine))?;
+    let identifier = CString::new(guid(machine)?)?;
     let location = CString::new(format!("file://{}", folder.display()))?;
     let callbacks = Fmi2Callbacks {
         logger: None,

@@ -10,11 +10,15 @@ use crate::units::base_unit;
 use crate::variables::{Causality, FmuType, FmuVariable, FmuVariables, text_value};
 use crate::{MACHINE_FILE, MODEL_IDENTIFIER};
 
-/// Returns the identifier that connects model description, library and the text of the machine file.
-pub fn guid(machine_file: &str) -> String {
+/// Returns the identifier that connects model description, library and machine file: a hash of the text of the machine
+/// file and of all variables.
+///
+/// # Errors
+/// The text of an error of the machine file or of the machine.
+pub fn guid(machine_file: &str) -> Result<String, String> {
     let version = env!("CARGO_PKG_VERSION");
-    let hash = checksum(format!("{version}\n{machine_file}").as_bytes());
-    format!("{MODEL_IDENTIFIER}-{version}-{hash:016x}")
+    let hash = checksum(format!("{machine_file}\n{}", description_with(machine_file, "")?).as_bytes());
+    Ok(format!("{MODEL_IDENTIFIER}-{version}-{hash:016x}"))
 }
 
 /// Returns the model description of the machine in a machine file.
@@ -22,6 +26,10 @@ pub fn guid(machine_file: &str) -> String {
 /// # Errors
 /// The text of an error of the machine file or of the machine.
 pub fn model_description(machine_file: &str) -> Result<String, String> {
+    description_with(machine_file, &guid(machine_file)?)
+}
+
+fn description_with(machine_file: &str, guid: &str) -> Result<String, String> {
     let parameters = Parameters::from_yaml(machine_file, MACHINE_FILE).map_err(|error| error.to_string())?;
     let variables = FmuVariables::new(&parameters)?;
     let variables = variables.list();
@@ -41,7 +49,7 @@ pub fn model_description(machine_file: &str) -> Result<String, String> {
          \x20   canNotUseMemoryManagementFunctions=\"true\" canGetAndSetFMUstate=\"true\"\n\
          \x20   canSerializeFMUstate=\"true\"/>\n",
         name = escaped(&name),
-        guid = escaped(&guid(machine_file)),
+        guid = escaped(guid),
         version = env!("CARGO_PKG_VERSION"),
     );
     write_units(&mut out, variables);

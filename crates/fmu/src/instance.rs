@@ -36,7 +36,7 @@ impl FmuInstance {
         callbacks: Fmi2Callbacks,
     ) -> Result<Self, String> {
         let text = machine_file(location)?;
-        let wanted = guid(&text);
+        let wanted = guid(&text)?;
         if found_guid != wanted {
             return Err(format!(
                 "fmuGUID is {found_guid:?}; it must be {wanted:?}, that of this library and of {MACHINE_FILE}: \

@@ -35,7 +35,7 @@ fn random_calls_in_any_order_return_a_status_without_leak_or_invalid_access() {
     for seed in ["1", "2", "3"] {
         let output = Command::new(&program)
             .arg(library())
-            .arg(guid(&machine))
+            .arg(guid(&machine).expect("valid"))
             .arg(format!("file://{}", folder.display()))
             .args([seed, "10000"])
             .output()
