@@ -9,6 +9,11 @@ const fn parameters(label: &'static str, service: &'static str, content: &'stati
     NodeService { label, package: "rcl_interfaces", service, content }
 }
 
+/// Creates a service of lifecycle_msgs.
+const fn lifecycle(label: &'static str, service: &'static str, content: &'static str) -> NodeService {
+    NodeService { label, package: "lifecycle_msgs", service, content }
+}
+
 /// Creates a service of type std_srvs/Trigger.
 const fn trigger(label: &'static str, content: &'static str) -> NodeService {
     NodeService { label, package: "std_srvs", service: "Trigger", content }
@@ -58,7 +63,25 @@ pub const SET_PARAMETERS_ATOMICALLY: NodeService = parameters(
     "sets several live parameters in the same position cycle, or none",
 );
 
-/// All services, those of the action excluded.
+/// Service that executes a transition of a managed node.
+pub const CHANGE_STATE: NodeService = lifecycle("change_state", "ChangeState", "executes a transition");
+/// Service that returns the state of a managed node.
+pub const GET_STATE: NodeService = lifecycle("get_state", "GetState", "present state");
+/// Service that lists the states of a managed node.
+pub const GET_AVAILABLE_STATES: NodeService =
+    lifecycle("get_available_states", "GetAvailableStates", "all states");
+/// Service that lists the transitions of a managed node that are possible.
+pub const GET_AVAILABLE_TRANSITIONS: NodeService =
+    lifecycle("get_available_transitions", "GetAvailableTransitions", "transitions that are possible now");
+/// Service that lists all transitions of a managed node.
+pub const GET_TRANSITION_GRAPH: NodeService =
+    lifecycle("get_transition_graph", "GetAvailableTransitions", "all transitions");
+
+/// Services of a managed node (`--lifecycle`), besides [`SERVICES`].
+pub const LIFECYCLE_SERVICES: &[NodeService] =
+    &[CHANGE_STATE, GET_STATE, GET_AVAILABLE_STATES, GET_AVAILABLE_TRANSITIONS, GET_TRANSITION_GRAPH];
+
+/// All services, those of the action and of the lifecycle excluded.
 pub const SERVICES: &[NodeService] = &[
     RESET,
     STOP,

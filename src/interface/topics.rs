@@ -18,6 +18,10 @@ pub const ROSOUT_QOS: QosConfig = QosConfig { is_reliable: true, is_transient_lo
 pub const PARAMETER_EVENTS_QOS: QosConfig =
     QosConfig { is_reliable: true, is_transient_local: false, depth: 1 };
 
+/// QoS of rcl's `~/transition_event`.
+pub const TRANSITION_EVENT_QOS: QosConfig =
+    QosConfig { is_reliable: true, is_transient_local: false, depth: 10 };
+
 /// Creates a topic with QoS parameters that always exists.
 const fn topic(
     direction: super::TopicDirection,
@@ -196,7 +200,19 @@ pub const PARAMETER_EVENTS: Topic = Topic {
     ..topic(Out, "/parameter_events", ("rcl_interfaces", "ParameterEvent"), "changed parameters", "any")
 };
 
-/// All topics, those of the action excluded.
+/// Beginnings and ends of transitions of a managed node.
+pub const TRANSITION_EVENT: Topic = Topic {
+    qos: TopicQos::Constant(TRANSITION_EVENT_QOS),
+    ..topic(
+        Out,
+        "~/transition_event",
+        ("lifecycle_msgs", "TransitionEvent"),
+        "beginnings and ends of transitions of a managed node (`--lifecycle`)",
+        "any",
+    )
+};
+
+/// All topics, those of the action and of the lifecycle excluded.
 pub const TOPICS: &[Topic] = &[
     PSEC,
     PSEC_STREAM,

@@ -69,6 +69,17 @@ pub enum Command {
     UpdateParameters(Arc<MachineParameters>),
     /// Resets the machine to rest at home.
     Reset(oneshot::Sender<()>),
+    /// Accepts motions and publishes samples.
+    Activate,
+    /// Rejects motions, stops every joint, and publishes no samples once all are at rest.
+    Deactivate {
+        /// Identifier of the stop, which is not reported.
+        id: MotionId,
+        /// Controlled stop; `None` if the machine has no joint.
+        stop: Option<Arc<Trajectory>>,
+        /// Resolves when the setpoints are at rest.
+        done: oneshot::Sender<()>,
+    },
     /// Ends the thread.
     Shutdown,
 }
@@ -120,6 +131,8 @@ pub struct ProgramPlace {
 /// Samples of all axes at one position cycle.
 #[derive(Debug, Clone, Default)]
 pub struct SampleFrame {
+    /// True if the samples are published; false while a managed node is not active.
+    pub is_published: bool,
     /// Number of the position cycle.
     pub instant: i64,
     /// Time of the position cycle, ns.

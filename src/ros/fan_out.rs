@@ -58,6 +58,9 @@ impl FanOut {
             if let Some(clock) = &self.clock {
                 clock.send(frame.time).await;
             }
+            if !frame.is_published {
+                continue;
+            }
             let is_due = frame.instant % self.every == 0;
             if let Some(tool) = &self.tool {
                 tool.update(&frame, is_due).await;

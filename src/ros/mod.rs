@@ -37,6 +37,7 @@ mod goal_event;
 mod health;
 mod inputs;
 mod large_response;
+mod lifecycle;
 pub mod log;
 mod matched_subscriptions;
 pub mod node;

@@ -57,3 +57,54 @@ impl ParameterHost for NodeParameterHost {
         Ok(())
     }
 }
+
+/// Parameter host of a managed node that is not configured: every parameter can be set.
+pub struct UnconfiguredParameterHost {
+    store: ParameterStore,
+    /// Changes since the start.
+    changes: Vec<(String, ParameterValue)>,
+}
+
+impl UnconfiguredParameterHost {
+    /// Creates a host of `parameters`.
+    pub fn new(parameters: Parameters) -> Self {
+        UnconfiguredParameterHost {
+            store: ParameterStore::new(parameters, Arc::default()),
+            changes: Vec::new(),
+        }
+    }
+
+    /// Returns `parameters` with the changes since the start.
+    ///
+    /// # Errors
+    /// Text with name, value and allowed values of a change that is invalid with these parameters.
+    pub fn apply_to(&self, parameters: Parameters) -> Result<Parameters, String> {
+        let store = ParameterStore::new(parameters, Arc::default());
+        store.check_all(self.changes.clone()).map(|(changed, _)| changed)
+    }
+}
+
+impl ParameterHost for UnconfiguredParameterHost {
+    fn names(&self) -> Vec<String> {
+        self.store.names()
+    }
+
+    fn get(&self, name: &str) -> Option<ParameterValue> {
+        self.store.get(name)
+    }
+
+    fn describe(&self, name: &str) -> Option<ParameterDescriptor> {
+        self.store.describe(name)
+    }
+
+    async fn ready(&mut self) {}
+
+    fn set(&mut self, changes: Vec<(String, ParameterValue)>) -> Result<(), String> {
+        let (changed, _) = tokio::task::block_in_place(|| self.store.check_all(changes.clone()))?;
+        self.store.replace(changed);
+        // Of several changes of a parameter the last one counts.
+        self.changes.retain(|(name, _)| changes.iter().all(|(changed, _)| changed != name));
+        self.changes.extend(changes);
+        Ok(())
+    }
+}

@@ -10,7 +10,7 @@ use ros2_client::{MessageTypeName, Node};
 use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::Time;
 use ros2_interfaces_jazzy_serde::rcl_interfaces::msg::Log;
 use rustdds::DomainParticipant;
-use tokio::sync::mpsc;
+use tokio::sync::{Mutex, mpsc};
 
 use super::args::{LogLevel, RosArgs};
 use super::endpoints::{EndpointError, Publisher, create_topic, with_sample_limit};
@@ -61,8 +61,9 @@ pub(super) fn publisher(
 /// Publishes log records until the log is closed.
 pub(super) async fn publish(
     (writers, tap): (Arc<TopicWriters<Log>>, Tap<Log>),
-    mut records: mpsc::Receiver<LogRecord>,
+    records: Arc<Mutex<mpsc::Receiver<LogRecord>>>,
 ) {
+    let mut records = records.lock().await;
     while let Some(record) = records.recv().await {
         let message = message(record);
         tap.record(&message).await;

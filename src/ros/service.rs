@@ -14,7 +14,7 @@ use futures::stream::{BoxStream, FuturesUnordered};
 use futures::{FutureExt, StreamExt};
 use ros2_client::qos::{History, QosProfile, WhenFull};
 use ros2_client::service::RmwRequestId;
-use ros2_client::{Context, Node, ServiceTypeName};
+use ros2_client::{Context, Message, MessageTypeName, Name, Node, Publisher, ServiceTypeName};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -23,7 +23,7 @@ use super::large_response::LargeResponses;
 use super::renewable::{DeliveredSamples, EndpointContext, Renewable};
 use super::response_limiter::{ResponseLimiter, ResponsePermit};
 use super::service_endpoints::ServiceOfParticipant;
-use crate::interface::NodeService;
+use crate::interface::{NodeService, Topic};
 
 /// Longest time for which a write waits for a slow reader.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
@@ -84,6 +84,28 @@ pub fn profile(depth: usize) -> QosProfile {
     QosProfile::publisher_default()
         .reliability_reliable(WhenFull::Wait(WRITE_TIMEOUT))
         .history(History::KeepLast { depth })
+}
+
+/// Creates the publisher of a topic with the QoS of [`profile`].
+///
+/// # Errors
+/// [`ServiceError`] with the name of the topic if it cannot be resolved or created.
+pub fn publisher<M: Message + Send + Sync + 'static>(
+    node: &mut Node,
+    context: &EndpointContext,
+    args: &RosArgs,
+    topic: &Topic,
+    depth: usize,
+) -> Result<Arc<Renewable<Publisher<M>>>, ServiceError> {
+    let Topic { name, package, message, .. } = *topic;
+    let error = |reason: String| ServiceError { name: name.to_owned(), reason };
+    let resolved = args.resolve_topic(name).map_err(|e| error(e.to_string()))?;
+    let name = Name::parse(&resolved).map_err(|e| error(e.to_string()))?;
+    let create = move |node: &mut Node, _: &Context| {
+        let topic = node.create_topic(&name, MessageTypeName::new(package, message), &profile(depth));
+        topic.and_then(|topic| node.create_publisher(&topic, None)).map_err(|e| e.to_string())
+    };
+    Renewable::create(node, context, create).map_err(error)
 }
 
 /// Service with its response writer.

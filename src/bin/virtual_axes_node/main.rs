@@ -30,9 +30,10 @@ const USAGE_ERROR: u8 = 2;
 const HELP: &str = "\
 virtual_axes_node: ROS 2 node that simulates the feed drives of a machine tool
 
-    virtual_axes_node [--ros-args ...]
+    virtual_axes_node [--lifecycle] [--ros-args ...]
 
 Without arguments, the embedded Mikron UCP 710 runs in real time.
+    --lifecycle                      managed node: configure and activate it with `ros2 lifecycle`
     --ros-args -p NAME:=VALUE        set a parameter; `virtual_axes parameters` lists them
                --params-file FILE    load a machine, or some of its parameters
                -r FROM:=TO           remap a topic or service
@@ -94,8 +95,9 @@ fn run(args: &RosArgs) -> ExitCode {
     for warning in environment.warnings().iter().chain(args.warnings()) {
         tracing::warn!("{warning}");
     }
+    let read = || parameters(args).map_err(|error| error.to_string());
     let (status, error) = match parameters(args) {
-        Ok(parameters) => match node::run(args, &environment, &security, parameters, records) {
+        Ok(parameters) => match node::run(args, &environment, &security, &read, parameters, records) {
             Ok(()) => (ExitCode::SUCCESS, None),
             Err(error) => {
                 let status = if error.is_usage() { ExitCode::from(USAGE_ERROR) } else { ExitCode::FAILURE };

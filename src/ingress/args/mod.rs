@@ -1,4 +1,4 @@
-//! Command line of a ROS 2 node: `[--help | --version] [--ros-args … [--]]…`.
+//! Command line of a ROS 2 node: `[--help | --version] [--lifecycle] [--ros-args … [--]]…`.
 //!
 //! Grammar and semantics are those of rcl:
 //!
@@ -13,8 +13,8 @@
 //! | `-e`, `--enclave /path` | enclave of the node; the last one applies |
 //! | `--log-file-name P`, `--log-config-file F` | accepted without effect |
 //!
-//! `from` can begin with `rostopic://` or `rosservice://`. Arguments that rcl passes to the program are rejected,
-//! because the program has no arguments of its own.
+//! `from` can begin with `rostopic://` or `rosservice://`. Of the arguments that rcl passes to the program, those above are
+//! accepted.
 
 mod parse;
 #[cfg(test)]
@@ -130,7 +130,9 @@ pub enum ArgsError {
         found: String,
     },
     /// Unknown argument outside `--ros-args … --`.
-    #[error("unknown argument '{found}'; allowed are --help, --version, and ROS arguments after --ros-args")]
+    #[error(
+        "unknown argument '{found}'; allowed are --help, --version, --lifecycle, and ROS arguments after --ros-args"
+    )]
     Outside {
         /// Argument.
         found: String,
@@ -186,6 +188,7 @@ pub struct RosArgs {
     logger_levels: Vec<(String, LogLevel)>,
     log_sinks: LogSinks,
     enclave: Option<String>,
+    is_managed: bool,
     warnings: Vec<String>,
 }
 
@@ -233,6 +236,12 @@ impl RosArgs {
     #[must_use]
     pub fn enclave(&self) -> Option<&str> {
         self.enclave.as_deref()
+    }
+
+    /// Returns true if the node is a managed node with a lifecycle.
+    #[must_use]
+    pub fn is_managed(&self) -> bool {
+        self.is_managed
     }
 
     /// Returns the warnings about accepted arguments without effect, for the log.

@@ -46,6 +46,7 @@ impl Command {
                 (true, flag) => draft.parse_flag(flag, || arguments.next())?,
                 (false, "--help" | "-h") => command = command.or(Some(Self::Help)),
                 (false, "--version" | "-V") => command = command.or(Some(Self::Version)),
+                (false, "--lifecycle") => draft.is_managed = true,
                 (false, other) => {
                     return Err(ArgsError::Outside { found: other.to_owned() });
                 }
@@ -77,6 +78,7 @@ struct ArgsDraft {
     logger_levels: Vec<(String, LogLevel)>,
     enclave: Option<String>,
     log_sinks: LogSinks,
+    is_managed: bool,
     warnings: Vec<String>,
 }
 
@@ -237,6 +239,7 @@ impl ArgsDraft {
             log_level: self.log_level,
             logger_levels: self.logger_levels,
             enclave: self.enclave,
+            is_managed: self.is_managed,
             log_sinks: self.log_sinks,
             warnings: self.warnings,
         })

@@ -93,22 +93,35 @@ impl ParameterStore {
         })
     }
 
-    /// Validates `changes` and returns the changed values and the resulting machine, without applying them.
+    /// Validates `changes` of a running node and returns the changed values and the resulting machine, without
+    /// applying them.
+    ///
+    /// # Errors
+    /// Text with name, value and allowed values of the first invalid change, or of a parameter that is not live.
+    pub fn check(
+        &self,
+        changes: Vec<(String, ParameterValue)>,
+    ) -> Result<(Parameters, MachineParameters), String> {
+        let is_fixed = |key: &String| self.parameters.definition(key).is_some_and(|d| !d.is_live);
+        if let Some(key) = changes.iter().map(|(key, _)| key).find(|key| is_fixed(key)) {
+            return Err(format!(
+                "{key} cannot be set while the node runs; set it at the start with -p or --params-file"
+            ));
+        }
+        self.check_all(changes)
+    }
+
+    /// Validates `changes` of a node that is not configured, without applying them.
     ///
     /// # Errors
     /// Text with name, value and allowed values of the first invalid change.
-    pub fn check(
+    pub fn check_all(
         &self,
         changes: Vec<(String, ParameterValue)>,
     ) -> Result<(Parameters, MachineParameters), String> {
         let source = ValueSource::named("parameter");
         let mut assignments = Vec::with_capacity(changes.len());
         for (key, value) in changes {
-            if self.parameters.definition(&key).is_some_and(|d| !d.is_live) {
-                return Err(format!(
-                    "{key} cannot be set while the node runs; set it at the start with -p or --params-file"
-                ));
-            }
             let value = from_ros(value).ok_or_else(|| {
                 format!("{}: type is an empty list or byte array; neither is supported", shortened(&key))
             })?;

@@ -10,7 +10,6 @@ use crate::ros::action::{ActionServer, ActionTopics, TrajectoryGoals};
 use crate::ros::args::RosArgs;
 use crate::ros::endpoints::{Endpoints, Publisher};
 use crate::ros::parameter_services::ParameterServices;
-use crate::ros::participant::create_node;
 use crate::ros::program::ProgramGoals;
 use crate::ros::query_state::QueryStateService;
 use crate::ros::recorder::TopicRecorder;
@@ -47,19 +46,19 @@ pub(super) struct NodeServices {
 }
 
 impl NodeEndpoints {
-    /// Creates the node and its endpoints in `context`.
+    /// Creates the endpoints of `node` in `context`; `services` are its parameter services.
     ///
     /// # Errors
-    /// [`NodeError`] naming the node, topic or service that cannot be created.
+    /// [`NodeError`] naming the topic or service that cannot be created.
     pub(super) fn create(
+        mut node: Node,
+        services: ParameterServices,
         context: &EndpointContext,
         args: &RosArgs,
         parameters: &Parameters,
         setup: &NodeSetup,
         recorder: &mut TopicRecorder,
     ) -> Result<Self, NodeError> {
-        let mut node = create_node(context, args)
-            .map_err(|reason| NodeError::Node { name: args.node().to_string(), reason })?;
         let rosout = rosout::publisher(&mut node, &context.domain_participant(), args, recorder)?;
         let mut endpoints = Endpoints::new(&mut node, context, args, parameters, recorder);
         let mut topics = Topics::create(&mut endpoints, args, setup.mode)?;
@@ -73,8 +72,8 @@ impl NodeEndpoints {
         let feed_hold = TriggerService::new(&mut node, context, args, &FEED_HOLD)?;
         let cycle_start = TriggerService::new(&mut node, context, args, &CYCLE_START)?;
         let query_state = QueryStateService::new(&mut node, context, args)?;
-        let parameters = ParameterServices::new(&mut node, context, args)?;
-        let services = NodeServices { reset, stop, feed_hold, cycle_start, query_state, parameters };
+        let services =
+            NodeServices { reset, stop, feed_hold, cycle_start, query_state, parameters: services };
         Ok(NodeEndpoints {
             node,
             rosout,

@@ -2,6 +2,7 @@
 
 mod endpoints;
 mod error;
+mod managed;
 mod outputs;
 mod requests;
 mod setup;
@@ -16,26 +17,31 @@ use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 use futures::FutureExt;
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{Mutex, mpsc, oneshot, watch};
 use tokio::task::JoinSet;
 
 use super::args::RosArgs;
+use super::axes_interface::Command;
 use super::clock::ClockState;
 use super::discovery_gate::ClosedGate;
 use super::environment::Environment;
 use super::health::Health;
+use super::inputs::next_motion_id;
 use super::log::LogRecord;
 use super::own_participants::OwnParticipants;
 use super::parameter_host::LiveNodeParameters;
+use super::parameter_services::ParameterServices;
 use super::participant::Participant;
+use super::participant::create_node;
 use super::recorder::{TopicRecorder, TopicRecording};
 use super::renewable::EndpointContext;
 use super::security::Security;
 use super::service;
 use super::static_peers;
 use super::topics::Topics;
-use crate::interface::SERVICES;
+use crate::interface::{LIFECYCLE_SERVICES, SERVICES};
 use endpoints::NodeEndpoints;
+use managed::{ManagedNode, OperationEnd};
 use outputs::{NodeOutputs, NodePublishers, start_outputs};
 use setup::NodeSetup;
 use shutdown::{ShutdownSequence, ShutdownSignals};
@@ -43,7 +49,8 @@ use tasks::NodeTasks;
 use thread::{AxesThread, AxesThreadEnds};
 use virtual_axes_core::config::{Parameters, TimeMode};
 
-/// Runs the node until SIGINT, SIGTERM or SIGHUP; the records of `log` are published on `/rosout`.
+/// Runs the node until SIGINT, SIGTERM or SIGHUP; the records of `log` are published on `/rosout`. `read` reads the
+/// parameters again, at each configuration of a managed node.
 ///
 /// # Errors
 /// [`NodeError`] if the node cannot start; its endpoints are removed from the network then.
@@ -51,6 +58,7 @@ pub fn run(
     args: &RosArgs,
     environment: &Environment,
     security: &Security,
+    read: &(dyn Fn() -> Result<Parameters, String> + Sync),
     parameters: Parameters,
     log: mpsc::Receiver<LogRecord>,
 ) -> Result<(), NodeError> {
@@ -60,31 +68,65 @@ pub fn run(
         .enable_all()
         .build()
         .map_err(|source| NodeError::System { what: "start the runtime", source })?;
-    let gate = ClosedGate::new();
-    let participants = OwnParticipants::new(Participant::open_with(environment, security)?);
-    let result = runtime.block_on(serve(args, &participants, gate, parameters, log));
+    let log = Arc::new(Mutex::new(log));
+    let mut signals = {
+        let _context = runtime.enter();
+        ShutdownSignals::new()?
+    };
+    let (participants, result) = loop {
+        let gate = ClosedGate::new();
+        let participants = OwnParticipants::new(Participant::open_with(environment, security)?);
+        let (start, log) = (parameters.clone(), Arc::clone(&log));
+        let result = runtime.block_on(serve(args, &participants, gate, read, start, &mut signals, log));
+        match result {
+            Ok(OperationEnd::Cleanup) => participants.shutdown(),
+            Ok(OperationEnd::Signal) => break (participants, Ok(())),
+            Err(error) => break (participants, Err(error)),
+        }
+    };
     // Tasks and endpoints have ended; remaining blocking threads are not waited for.
     runtime.shutdown_timeout(Duration::from_millis(50));
     participants.shutdown();
     result
 }
 
-/// Creates the node, runs it until a signal, and shuts it down. Other participants discover it with all its endpoints,
-/// when `gate` opens.
+/// Creates the node, runs it until a signal or a cleanup, and shuts it down. Other participants discover it with all
+/// its endpoints, when `gate` opens; a managed node with those of its lifecycle and parameters.
 async fn serve(
     args: &RosArgs,
     participants: &OwnParticipants,
     gate: ClosedGate,
+    read: &(dyn Fn() -> Result<Parameters, String> + Sync),
     parameters: Parameters,
-    log: mpsc::Receiver<LogRecord>,
-) -> Result<(), NodeError> {
-    service::check_names(args, SERVICES.iter().map(|service| service.label))?;
-    let signals = ShutdownSignals::new()?;
-    let setup = NodeSetup::new(&parameters)?;
+    signals: &mut ShutdownSignals,
+    log: Arc<Mutex<mpsc::Receiver<LogRecord>>>,
+) -> Result<OperationEnd, NodeError> {
+    let lifecycle = if args.is_managed() { LIFECYCLE_SERVICES } else { &[] };
+    service::check_names(args, SERVICES.iter().chain(lifecycle).map(|service| service.label))?;
     let (health_out, health) = watch::channel(Health::default());
-    let mut recorder = TopicRecorder::open(&setup.node_config, setup.overflow, &health)?;
+    let configure = |parameters: Parameters| {
+        let setup = NodeSetup::new(&parameters)?;
+        let recorder = TopicRecorder::open(&setup.node_config, setup.overflow, &health)?;
+        Ok::<_, NodeError>((parameters, setup, recorder))
+    };
     let context = EndpointContext::new(participants.context()?);
-    let endpoints = NodeEndpoints::create(&context, args, &parameters, &setup, &mut recorder)?;
+    let mut node = create_node(&context, args)
+        .map_err(|reason| NodeError::Node { name: args.node().to_string(), reason })?;
+    let services = ParameterServices::new(&mut node, &context, args)?;
+    let mut gate = Some(gate);
+    let (configured, mut managed) = if args.is_managed() {
+        let mut managed = ManagedNode::start(&mut node, &context, args)?;
+        gate = None;
+        match managed.wait_for_configuration(&services, parameters, read, signals, configure).await {
+            Some((configured, done)) => (configured, Some((managed, Some(done)))),
+            None => return Ok(OperationEnd::Signal),
+        }
+    } else {
+        (configure(parameters)?, None)
+    };
+    let (parameters, setup, mut recorder) = configured;
+    let endpoints =
+        NodeEndpoints::create(node, services, &context, args, &parameters, &setup, &mut recorder)?;
     let NodeEndpoints {
         node,
         rosout,
@@ -151,11 +193,27 @@ async fn serve(
     tasks.spawn_reports(reports);
     let pace = tasks.pace(inputs, fan_out.run(frames).boxed(), clock);
     names.print(args, setup.config.name(), setup.mode);
+    if managed.is_some() {
+        // The thread executes it before its first position cycle.
+        let (done, _) = oneshot::channel();
+        let deactivate = Command::Deactivate { id: next_motion_id(&tasks.ids), stop: None, done };
+        _ = tasks.commands.send(deactivate).await;
+    }
     let thread_ended = axes_thread.spawn(pace)?;
     drop(gate);
 
-    signals.wait().await;
+    let end = match &mut managed {
+        None => {
+            signals.wait().await;
+            OperationEnd::Signal
+        }
+        Some((managed, done)) => {
+            // The receiver is dropped only with its server.
+            _ = done.take().map(|done| done.send(true));
+            managed.run(&tasks.commands, tasks.stop(), signals).await
+        }
+    };
     let NodeTasks { commands, tasks, .. } = tasks;
     ShutdownSequence { actions: [action, program], commands, tasks, thread_ended, recording }.run().await;
-    Ok(())
+    Ok(end)
 }

@@ -36,7 +36,7 @@ impl ShutdownSignals {
     }
 
     /// Waits for SIGINT, SIGTERM or SIGHUP.
-    pub(super) async fn wait(mut self) {
+    pub(super) async fn wait(&mut self) {
         let name = tokio::select! {
             _ = self.interrupt.recv() => "SIGINT",
             _ = self.terminate.recv() => "SIGTERM",

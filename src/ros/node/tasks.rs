@@ -14,7 +14,7 @@ use ros2_interfaces_jazzy_serde::rosgraph_msgs::msg::Clock;
 use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 use tokio::runtime::Handle;
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{Mutex, mpsc, watch};
 use tokio::task::JoinSet;
 
 use super::endpoints::NodeServices;
@@ -49,6 +49,7 @@ use crate::ros::topic_writers::TopicWriters;
 use crate::ros::writer_rotation::{RotatedTopics, RotationContext};
 use crate::ros::{convert, rosout};
 use virtual_axes_core::config::{Parameters, TimeMode};
+use virtual_axes_core::trajectory::{MotionId, Trajectory};
 use virtual_axes_io::messages::SpeedScalingFactor;
 
 /// Tasks of the node, with their shared state.
@@ -70,7 +71,7 @@ impl NodeTasks<'_> {
     pub(super) fn spawn_log_output(
         &mut self,
         rosout: Option<(Arc<TopicWriters<Log>>, Tap<Log>)>,
-        log: mpsc::Receiver<LogRecord>,
+        log: Arc<Mutex<mpsc::Receiver<LogRecord>>>,
     ) {
         if let Some(output) = rosout {
             self.tasks.spawn(rosout::publish(output, log));
@@ -182,16 +183,26 @@ impl NodeTasks<'_> {
         self.tasks.spawn(receive_feed_overrides(input, self.commands.clone()));
     }
 
+    /// Returns the function that returns a controlled stop of every joint and its identifier.
+    pub(super) fn stop(&self) -> impl Fn() -> (MotionId, Option<Arc<Trajectory>>) + Send + 'static {
+        let NodeSetup { joint_limits, period, node_config, .. } = self.setup;
+        let stop = stop_of_all_joints(joint_limits, *period, node_config.max_points);
+        let ids = Arc::clone(&self.ids);
+        move || (next_motion_id(&ids), stop.clone())
+    }
+
     /// Starts the parameter services, `~/stop`, `~/reset`, `~/feed_hold` and `~/cycle_start`.
     pub(super) fn spawn_services(&mut self, services: NodeServices, parameters: Parameters) {
         let health = self.health.clone();
         let now = move || convert::stamp(health.borrow().time);
-        let host = NodeParameterHost::new(parameters, self.commands.clone(), Arc::clone(&self.live));
-        self.tasks.spawn(services.parameters.serve(host, now, pending()));
-        let NodeSetup { joint_limits, period, node_config, .. } = self.setup;
-        let stop = stop_of_all_joints(joint_limits, *period, node_config.max_points);
-        let (commands, ids) = (self.commands.clone(), Arc::clone(&self.ids));
-        let act = move || stop_axes(commands.clone(), next_motion_id(&ids), stop.clone());
+        let mut host = NodeParameterHost::new(parameters, self.commands.clone(), Arc::clone(&self.live));
+        let parameters = services.parameters;
+        self.tasks.spawn(async move { parameters.serve(&mut host, now, pending()).await });
+        let (commands, stop) = (self.commands.clone(), self.stop());
+        let act = move || {
+            let (id, stop) = stop();
+            stop_axes(commands.clone(), id, stop)
+        };
         self.tasks.spawn(services.stop.serve(act));
         let commands = self.commands.clone();
         self.tasks.spawn(services.reset.serve(move || reset_axes(commands.clone())));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{mpsc, oneshot, watch};
 use tracing::{info, warn};
 
 use crate::ros::arc_pool::ArcPool;
@@ -20,6 +20,16 @@ use virtual_axes_core::units::Nanoseconds;
 /// Largest number of unread reports on stream ends. Later ends are merged into the next report.
 const MAX_STREAM_ENDS: usize = 64;
 
+/// Activity of the axes of a managed node; other nodes are always active.
+enum Activity {
+    /// Motions are accepted and samples published.
+    Active,
+    /// The axes stop. Resolves when the setpoints are at rest.
+    Stopping(oneshot::Sender<()>),
+    /// No motion is accepted and no sample published.
+    Inactive,
+}
+
 /// Simulation with its reports.
 pub(super) struct Axes {
     simulation: Simulation,
@@ -35,6 +45,7 @@ pub(super) struct Axes {
     stops: Vec<MotionId>,
     /// Figures of the active part program.
     program: Option<ProgramMonitor>,
+    activity: Activity,
     /// Counter of the unread reports on stream ends.
     stream_ends: Arc<()>,
 }
@@ -49,7 +60,20 @@ impl Axes {
         let (stream, frames) = (StreamIntake::default(), ArcPool::default());
         let (motions, stops, stream_ends) = (Vec::new(), Vec::new(), Arc::new(()));
         let program = None;
-        Axes { simulation, reports, health, stream, resets: 0, motions, frames, stops, program, stream_ends }
+        let activity = Activity::Active;
+        Axes {
+            simulation,
+            reports,
+            health,
+            stream,
+            resets: 0,
+            motions,
+            frames,
+            stops,
+            program,
+            activity,
+            stream_ends,
+        }
     }
 
     pub(super) fn simulation(&self) -> &Simulation {
@@ -63,7 +87,8 @@ impl Axes {
 
     /// Computes the next position cycle.
     pub(super) fn step(&mut self) -> Arc<SampleFrame> {
-        let Axes { simulation, stream, resets, motions, frames, program, .. } = self;
+        let Axes { simulation, stream, resets, motions, frames, program, activity, .. } = self;
+        let is_published = !matches!(activity, Activity::Inactive);
         let instant = simulation.next_instant();
         simulation.step();
         stream.check_gaps(simulation);
@@ -74,6 +99,7 @@ impl Axes {
         };
         let place = program.as_mut().and_then(track);
         frames.acquire(|frame| {
+            frame.is_published = is_published;
             frame.instant = instant;
             frame.time = simulation.time_of(instant);
             frame.samples.clear();
@@ -88,6 +114,9 @@ impl Axes {
     /// Reports ended motions and counts the last computed instant as released.
     pub(super) fn finish_cycle(&mut self, lateness: Duration, is_missed: bool, is_dropped: bool) {
         self.report_ends();
+        if !self.simulation.is_busy() {
+            self.finish_deactivation();
+        }
         let Axes { simulation, stream, .. } = self;
         self.health.send_modify(|h| {
             h.update(simulation, lateness, is_missed, is_dropped);
@@ -128,6 +157,15 @@ impl Axes {
         }
     }
 
+    /// Ends a deactivation whose stop has ended.
+    fn finish_deactivation(&mut self) {
+        match std::mem::replace(&mut self.activity, Activity::Inactive) {
+            // The receiver is dropped after its timeout.
+            Activity::Stopping(done) => _ = done.send(()),
+            other => self.activity = other,
+        }
+    }
+
     /// Changes the clock's part of the diagnostics.
     pub(super) fn update_clock_health(&self, change: impl FnOnce(&mut ClockHealth)) {
         self.health.send_if_modified(|h| {
@@ -155,10 +193,18 @@ impl Axes {
 
     /// Applies a command; it takes effect in the next step.
     pub(super) fn apply(&mut self, command: Command) {
-        let Axes { simulation, reports, stream, resets, motions, stops, program, .. } = self;
+        let Axes { simulation, reports, stream, resets, motions, stops, program, activity, .. } = self;
+        let is_active = matches!(activity, Activity::Active);
         // Between two instants, the current time is the time of the first.
         let now = simulation.time_of(simulation.next_instant() - 1);
         match command {
+            Command::Submit { id, .. } | Command::BeginMotion { id, .. } if !is_active => {
+                let text = "the node is not active; activate it with ~/change_state";
+                let rejection = Rejection::new(RejectionCode::NotActive, text.to_owned());
+                let _ = reports.send(SimulationReport::Decision(id, now, Err(rejection)));
+            }
+            // A stream has no response.
+            Command::Stream(_) if !is_active => {}
             Command::Submit { id, trajectory, tolerances } => {
                 let admission = match tolerances {
                     Some(tolerances) => simulation.submit_with_tolerances(id, trajectory, *tolerances),
@@ -225,6 +271,19 @@ impl Axes {
                 simulation.reset();
                 *resets += 1;
                 let _ = done.send(());
+            }
+            Command::Activate => *activity = Activity::Active,
+            Command::Deactivate { id, stop, done } => {
+                if let Some(stop) = stop.filter(|_| simulation.is_busy()) {
+                    match simulation.submit(id, stop) {
+                        Ok(_) => stops.push(id),
+                        Err(rejection) => warn!("controlled stop rejected: {rejection}"),
+                    }
+                }
+                *activity = Activity::Stopping(done);
+                if !simulation.is_busy() {
+                    self.finish_deactivation();
+                }
             }
             // The caller ends the thread.
             Command::Shutdown => {}

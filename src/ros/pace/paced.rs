@@ -171,6 +171,8 @@ impl PacedAxes {
             | Command::SetFeedHold(_)
             | Command::QueryState(..)
             | Command::UpdateParameters(_)
+            | Command::Activate
+            | Command::Deactivate { .. }
             | Command::Shutdown => self.axes.apply(command),
         }
     }

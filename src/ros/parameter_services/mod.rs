@@ -12,7 +12,7 @@ use futures::{
     future::BoxFuture,
     stream::{FuturesUnordered, select_all},
 };
-use ros2_client::{Context, Message, MessageTypeName, Name, Node, Publisher, service::RmwRequestId};
+use ros2_client::{Message, Node, Publisher, service::RmwRequestId};
 use ros2_interfaces_jazzy_serde::{
     builtin_interfaces::msg::Time,
     rcl_interfaces::{
@@ -29,9 +29,9 @@ use ros2_interfaces_jazzy_serde::{
 use super::args::RosArgs;
 use super::renewable::{EndpointContext, Renewable};
 use super::response_limiter::{ResponseLimiter, ResponsePermit};
-use super::service::{Service, ServiceError, profile};
+use super::service::{Service, ServiceError, publisher};
 use crate::ingress::parameters::{self as wire, ParameterHost, list_parameters};
-use crate::interface::{self, NodeService, PARAMETER_EVENTS_QOS, Topic};
+use crate::interface::{self, NodeService, PARAMETER_EVENTS_QOS};
 
 /// Depth of rmw's profile for parameter services: number of requests that a client may send at once.
 const QUEUE_DEPTH: usize = 1000;
@@ -71,15 +71,15 @@ impl ParameterServices {
             set_atomically: factory.service(&interface::SET_PARAMETERS_ATOMICALLY)?,
             list: factory.service(&interface::LIST_PARAMETERS)?,
             describe: factory.service(&interface::DESCRIBE_PARAMETERS)?,
-            events: factory.events()?,
+            events: publisher(node, context, args, &interface::PARAMETER_EVENTS, PARAMETER_EVENTS_QOS.depth)?,
             node_name: args.node().to_string(),
         })
     }
 
     /// Answers requests with the parameters of `host` until `stop` completes; `now` returns the time stamp of an event.
     pub async fn serve<H: ParameterHost>(
-        self,
-        mut host: H,
+        &self,
+        host: &mut H,
         now: impl Fn() -> Time + Send,
         stop: impl Future<Output = ()> + Send,
     ) {
@@ -102,7 +102,7 @@ impl ParameterServices {
                 Some(()) = responses.next(), if !responses.is_empty() => {}
                 Some((permit, request)) = limiter.next(&mut requests) => match request {
                     Ok(request) => {
-                        let response = self.handle_request(&mut host, &now, request, permit).await;
+                        let response = self.handle_request(host, &now, request, permit).await;
                         responses.push(response);
                     }
                     Err(reason) => tracing::warn!("{reason}"),
@@ -230,19 +230,6 @@ impl ParameterServiceFactory<'_> {
         A: Message + Send + Sync + 'static,
     {
         Service::new(self.node, self.context, self.args, service, QUEUE_DEPTH)
-    }
-
-    fn events(&mut self) -> Result<Arc<Renewable<Publisher<msg::ParameterEvent>>>, ServiceError> {
-        let Topic { name, package, message, .. } = interface::PARAMETER_EVENTS;
-        let error = |reason: String| ServiceError { name: name.to_owned(), reason };
-        let resolved = self.args.resolve_topic(name).map_err(|e| error(e.to_string()))?;
-        let name = Name::parse(&resolved).map_err(|e| error(e.to_string()))?;
-        let create = move |node: &mut Node, _: &Context| {
-            let type_name = MessageTypeName::new(package, message);
-            let topic = node.create_topic(&name, type_name, &profile(PARAMETER_EVENTS_QOS.depth));
-            topic.and_then(|topic| node.create_publisher(&topic, None)).map_err(|e| e.to_string())
-        };
-        Renewable::create(self.node, self.context, create).map_err(error)
     }
 }
 

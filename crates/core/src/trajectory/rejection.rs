@@ -64,6 +64,7 @@ rejection_codes! {
     MultiDof = 16, "MULTI_DOF",
         "of a goal: a multi-DOF trajectory or component tolerances, which are not supported";
     TooManyGoals = 17, "TOO_MANY_GOALS", "of a goal: 1024 goals are active";
+    NotActive = 18, "NOT_ACTIVE", "the node runs with `--lifecycle` and is not in the state active";
 }
 
 /// Rejection of a trajectory: code, joint, point, value and limit.

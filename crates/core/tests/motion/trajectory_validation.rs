@@ -33,6 +33,7 @@ fn rejection_codes_keep_their_values() {
         (RejectionCode::InvalidTolerance, 15),
         (RejectionCode::MultiDof, 16),
         (RejectionCode::TooManyGoals, 17),
+        (RejectionCode::NotActive, 18),
     ];
     for (code, number) in codes {
         assert_eq!(code as u8, number);

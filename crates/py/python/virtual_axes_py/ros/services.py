@@ -45,6 +45,7 @@ class ServiceNode(GraphNode):
         client = self._clients.get(service)
         if client is None:
             client = self._clients[service] = self.node.create_client(kind, f"{self.target}/{service}")
+        if not client.service_is_ready():
             self.wait_for(client.service_is_ready, timeout, f"service {service}")
             time.sleep(SETTLE_S)
         future = client.call_async(request)

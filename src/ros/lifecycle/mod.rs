@@ -1,0 +1,7 @@
+//! Lifecycle of a managed node: its services and the topic of its transitions.
+
+mod server;
+mod states;
+
+pub use server::{LifecycleServer, TransitionRequest};
+pub use states::RequestedTransition;

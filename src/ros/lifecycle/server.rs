@@ -1,0 +1,196 @@
+//! Services of the lifecycle and `~/transition_event`.
+
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use futures::StreamExt;
+use futures::future::BoxFuture;
+use futures::stream::{FuturesUnordered, select_all};
+use ros2_client::service::RmwRequestId;
+use ros2_client::{Node, Publisher};
+use ros2_interfaces_jazzy_serde::lifecycle_msgs::msg::{TransitionDescription, TransitionEvent};
+use ros2_interfaces_jazzy_serde::lifecycle_msgs::srv::{
+    ChangeStateRequest, ChangeStateResponse, GetAvailableStatesRequest, GetAvailableStatesResponse,
+    GetAvailableTransitionsRequest, GetAvailableTransitionsResponse, GetStateRequest, GetStateResponse,
+};
+use tokio::sync::{mpsc, oneshot};
+
+use super::states::{self, PrimaryState, RequestedTransition};
+use crate::interface::{
+    CHANGE_STATE, GET_AVAILABLE_STATES, GET_AVAILABLE_TRANSITIONS, GET_STATE, GET_TRANSITION_GRAPH,
+    NodeService, TRANSITION_EVENT, TRANSITION_EVENT_QOS,
+};
+use crate::ros::args::RosArgs;
+use crate::ros::renewable::{EndpointContext, Renewable};
+use crate::ros::response_limiter::{ResponseLimiter, ResponsePermit};
+use crate::ros::service::{Service, ServiceError, publisher};
+
+/// Number of requests that may wait.
+const DEPTH: usize = 10;
+
+/// Request to execute a transition.
+#[derive(Debug)]
+pub struct TransitionRequest {
+    /// Transition.
+    pub transition: RequestedTransition,
+    /// Receiver of the result: true if the transition succeeded.
+    pub done: oneshot::Sender<bool>,
+    /// Resolves when the response has been sent.
+    pub answered: oneshot::Receiver<()>,
+}
+
+/// Services of the lifecycle and the publisher of its transitions.
+pub struct LifecycleServer {
+    change: Service<ChangeStateRequest, ChangeStateResponse>,
+    state: Service<GetStateRequest, GetStateResponse>,
+    states: Service<GetAvailableStatesRequest, GetAvailableStatesResponse>,
+    transitions: Service<GetAvailableTransitionsRequest, GetAvailableTransitionsResponse>,
+    graph: Service<GetAvailableTransitionsRequest, GetAvailableTransitionsResponse>,
+    events: Arc<Renewable<Publisher<TransitionEvent>>>,
+}
+
+/// Received request.
+enum Request {
+    Change(RmwRequestId, ChangeStateRequest),
+    State(RmwRequestId),
+    States(RmwRequestId),
+    Transitions(RmwRequestId),
+    Graph(RmwRequestId),
+}
+
+/// Transition that is being executed.
+struct Execution {
+    description: TransitionDescription,
+    id: RmwRequestId,
+    permit: ResponsePermit,
+    done: oneshot::Receiver<bool>,
+    answered: oneshot::Sender<()>,
+}
+
+impl LifecycleServer {
+    /// Creates the services of `node`, which belongs to `context`, and the publisher.
+    ///
+    /// # Errors
+    /// [`ServiceError`] naming the first that cannot be created.
+    pub fn new(node: &mut Node, context: &EndpointContext, args: &RosArgs) -> Result<Self, ServiceError> {
+        let service =
+            |node: &mut Node, service: &NodeService| Service::new(node, context, args, service, DEPTH);
+        Ok(Self {
+            change: Service::new(node, context, args, &CHANGE_STATE, DEPTH)?,
+            state: Service::new(node, context, args, &GET_STATE, DEPTH)?,
+            states: Service::new(node, context, args, &GET_AVAILABLE_STATES, DEPTH)?,
+            transitions: service(node, &GET_AVAILABLE_TRANSITIONS)?,
+            graph: service(node, &GET_TRANSITION_GRAPH)?,
+            events: publisher(node, context, args, &TRANSITION_EVENT, TRANSITION_EVENT_QOS.depth)?,
+        })
+    }
+
+    /// Serves until the node shuts down, from the state unconfigured on; sends each transition to `transitions`.
+    pub async fn serve(self, transitions: mpsc::Sender<TransitionRequest>) {
+        let mut state = PrimaryState::Unconfigured;
+        let mut execution: Option<Execution> = None;
+        let mut requests = select_all([
+            self.change.requests_as(Request::Change),
+            self.state.requests_as(|id, _| Request::State(id)),
+            self.states.requests_as(|id, _| Request::States(id)),
+            self.transitions.requests_as(|id, _| Request::Transitions(id)),
+            self.graph.requests_as(|id, _| Request::Graph(id)),
+        ]);
+        let mut responses: FuturesUnordered<BoxFuture<'_, ()>> = FuturesUnordered::new();
+        let limiter = ResponseLimiter::default();
+        loop {
+            tokio::select! {
+                biased;
+                Some(()) = responses.next(), if !responses.is_empty() => {}
+                is_successful = ended(&mut execution) => {
+                    let Some(Execution { description, id, permit, answered, .. }) = execution.take() else { continue };
+                    if let Some((end, after)) = states::end(&description.goal_state, is_successful) {
+                        self.publish(end).await;
+                        state = after;
+                    }
+                    let response = self.change.respond(id, ChangeStateResponse { success: is_successful }, permit);
+                    responses.push(Box::pin(async {
+                        response.await;
+                        // The receiver is dropped if nobody waits.
+                        let _ = answered.send(());
+                    }));
+                }
+                Some((permit, request)) = limiter.next(&mut requests) => match request {
+                    Ok(Request::Change(id, request)) => {
+                        let found = state.find(&request.transition).filter(|_| execution.is_none());
+                        let Some((description, transition)) =
+                            found.and_then(|row| RequestedTransition::of(&row).map(|transition| (row, transition)))
+                        else {
+                            let label = &request.transition.label;
+                            let given = if label.is_empty() { request.transition.id.to_string() } else { label.clone() };
+                            tracing::warn!("transition {given} rejected: {}", allowed(state, execution.as_ref()));
+                            responses.push(self.change.respond(id, ChangeStateResponse { success: false }, permit));
+                            continue;
+                        };
+                        self.publish(description.clone()).await;
+                        let (done, result) = oneshot::channel();
+                        let (answered, answer) = oneshot::channel();
+                        // The receiver is dropped only at shutdown.
+                        let _ = transitions.send(TransitionRequest { transition, done, answered: answer }).await;
+                        execution = Some(Execution { description, id, permit, done: result, answered });
+                    }
+                    Ok(Request::State(id)) => {
+                        let current_state = match &execution {
+                            Some(execution) => execution.description.goal_state.clone(),
+                            None => state.message(),
+                        };
+                        responses.push(self.state.respond(id, GetStateResponse { current_state }, permit));
+                    }
+                    Ok(Request::States(id)) => {
+                        let response = GetAvailableStatesResponse { available_states: states::states() };
+                        responses.push(self.states.respond(id, response, permit));
+                    }
+                    Ok(Request::Transitions(id)) => {
+                        let available_transitions =
+                            if execution.is_some() { Vec::new() } else { state.available() };
+                        let response = GetAvailableTransitionsResponse { available_transitions };
+                        responses.push(self.transitions.respond(id, response, permit));
+                    }
+                    Ok(Request::Graph(id)) => {
+                        let response =
+                            GetAvailableTransitionsResponse { available_transitions: states::transitions() };
+                        responses.push(self.graph.respond(id, response, permit));
+                    }
+                    Err(reason) => tracing::warn!("{reason}"),
+                },
+                else => break,
+            }
+        }
+    }
+
+    /// Publishes the beginning or the end of a transition.
+    async fn publish(&self, row: TransitionDescription) {
+        let TransitionDescription { transition, start_state, goal_state } = row;
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let timestamp = u64::try_from(now.as_nanos()).unwrap_or(u64::MAX);
+        let event = TransitionEvent { timestamp, transition, start_state, goal_state };
+        if let Err(error) = self.events.current().async_publish(event).await {
+            tracing::warn!("transition event not published: {error:?}");
+        }
+    }
+}
+
+/// Waits for the end of a transition; false if it was given up. Without one, waits forever.
+async fn ended(execution: &mut Option<Execution>) -> bool {
+    match execution {
+        Some(execution) => (&mut execution.done).await.unwrap_or(false),
+        None => std::future::pending().await,
+    }
+}
+
+/// Returns the transitions that are possible, as text.
+fn allowed(state: PrimaryState, execution: Option<&Execution>) -> String {
+    if let Some(execution) = execution {
+        return format!("the node is {}", execution.description.goal_state.label);
+    }
+    let labels: Vec<String> = state.available().into_iter().map(|row| row.transition.label).collect();
+    match labels.is_empty() {
+        true => format!("the node is {}; no transition is possible", state.message().label),
+        false => format!("the node is {}; possible are {}", state.message().label, labels.join(", ")),
+    }
+}

@@ -1,0 +1,183 @@
+//! Lifecycle of a managed node: waits for its configuration, then executes transitions.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use futures::future::Either;
+use ros2_client::Node;
+use tokio::sync::{mpsc, oneshot};
+use tokio::task::JoinSet;
+use tokio::time::timeout;
+use tracing::{error, info, warn};
+
+use super::NodeError;
+use super::shutdown::ShutdownSignals;
+use crate::ros::args::RosArgs;
+use crate::ros::axes_interface::Command;
+use crate::ros::convert;
+use crate::ros::lifecycle::{LifecycleServer, RequestedTransition, TransitionRequest};
+use crate::ros::parameter_host::UnconfiguredParameterHost;
+use crate::ros::parameter_services::ParameterServices;
+use crate::ros::renewable::EndpointContext;
+use virtual_axes_core::config::Parameters;
+use virtual_axes_core::trajectory::{MotionId, Trajectory};
+
+/// Longest duration of a deactivation; a clock that stands still prevents its stop.
+const STOP_TIMEOUT: Duration = Duration::from_secs(10);
+/// Longest time for which a response is waited for.
+const RESPONSE_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Reason for which a node has ended its operation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum OperationEnd {
+    /// Signal: the process ends.
+    Signal,
+    /// Transition cleanup: the node starts again, unconfigured.
+    Cleanup,
+}
+
+/// Lifecycle services and the requested transitions.
+pub(super) struct ManagedNode {
+    transitions: mpsc::Receiver<TransitionRequest>,
+    /// Task of the services, which ends with this value.
+    _server: JoinSet<()>,
+}
+
+impl ManagedNode {
+    /// Creates the lifecycle services of `node` and starts them.
+    ///
+    /// # Errors
+    /// [`NodeError`] naming the service that cannot be created.
+    pub(super) fn start(
+        node: &mut Node,
+        context: &EndpointContext,
+        args: &RosArgs,
+    ) -> Result<Self, NodeError> {
+        let lifecycle = LifecycleServer::new(node, context, args)?;
+        let (transitions_out, transitions) = mpsc::channel(1);
+        let mut server = JoinSet::new();
+        server.spawn(lifecycle.serve(transitions_out));
+        Ok(ManagedNode { transitions, _server: server })
+    }
+
+    /// Serves the parameters that `read` returns until `configure` succeeds; `parameters` are those of the start, served
+    /// if `read` fails. Returns its result with the sender of the transition's result,
+    /// or `None` at a signal.
+    pub(super) async fn wait_for_configuration<T>(
+        &mut self,
+        services: &ParameterServices,
+        parameters: Parameters,
+        read: &(dyn Fn() -> Result<Parameters, String> + Sync),
+        signals: &mut ShutdownSignals,
+        mut configure: impl FnMut(Parameters) -> Result<T, NodeError>,
+    ) -> Option<(T, oneshot::Sender<bool>)> {
+        let mut host = UnconfiguredParameterHost::new(read().unwrap_or_else(|error| {
+            warn!("{error}");
+            parameters
+        }));
+        info!("unconfigured; waiting for the transition configure");
+        loop {
+            let (end_serving, is_ended) = oneshot::channel::<()>();
+            let now = || convert::stamp(0);
+            let ended = async { _ = is_ended.await };
+            let serving = services.serve(&mut host, now, ended);
+            let request = tokio::select! {
+                () = signals.wait() => return None,
+                request = next_with(&mut self.transitions, serving, end_serving) => request?,
+            };
+            let TransitionRequest { transition, done, .. } = request;
+            match transition {
+                RequestedTransition::Configure => {
+                    let configured = read().and_then(|parameters| host.apply_to(parameters));
+                    match configured.and_then(|machine| configure(machine).map_err(|error| error.to_string()))
+                    {
+                        Ok(configured) => return Some((configured, done)),
+                        Err(reason) => {
+                            error!("not configured: {reason}");
+                            _ = done.send(false);
+                        }
+                    }
+                }
+                RequestedTransition::Shutdown => _ = done.send(true),
+                // The server rejects these in this state.
+                _ => _ = done.send(false),
+            }
+        }
+    }
+
+    /// Executes transitions until a signal or a cleanup. `stop` returns a controlled stop and its identifier.
+    pub(super) async fn run(
+        &mut self,
+        commands: &mpsc::Sender<Command>,
+        stop: impl Fn() -> (MotionId, Option<Arc<Trajectory>>),
+        signals: &mut ShutdownSignals,
+    ) -> OperationEnd {
+        loop {
+            let request = tokio::select! {
+                () = signals.wait() => return OperationEnd::Signal,
+                request = self.transitions.recv() => request,
+            };
+            let Some(TransitionRequest { transition, done, answered }) = request else {
+                return OperationEnd::Signal;
+            };
+            match transition {
+                RequestedTransition::Activate => {
+                    info!("active");
+                    _ = done.send(commands.send(Command::Activate).await.is_ok());
+                }
+                RequestedTransition::Deactivate => {
+                    let is_stopped = deactivate(commands, stop()).await;
+                    if is_stopped {
+                        info!("inactive");
+                    } else {
+                        warn!("the axes did not stop within {} s; still active", STOP_TIMEOUT.as_secs());
+                        _ = commands.send(Command::Activate).await;
+                    }
+                    _ = done.send(is_stopped);
+                }
+                RequestedTransition::Cleanup => {
+                    info!("unconfigured");
+                    _ = done.send(true);
+                    let _ = timeout(RESPONSE_TIMEOUT, answered).await;
+                    return OperationEnd::Cleanup;
+                }
+                RequestedTransition::Shutdown => {
+                    let _ = deactivate(commands, stop()).await;
+                    info!("finalized; a signal ends the process");
+                    _ = done.send(true);
+                }
+                // The server rejects it in this state.
+                RequestedTransition::Configure => _ = done.send(false),
+            }
+        }
+    }
+}
+
+/// Returns the next transition while `serving` runs, which `end_serving` ends.
+async fn next_with(
+    transitions: &mut mpsc::Receiver<TransitionRequest>,
+    serving: impl Future<Output = ()>,
+    end_serving: oneshot::Sender<()>,
+) -> Option<TransitionRequest> {
+    let (serving, next) = (std::pin::pin!(serving), std::pin::pin!(transitions.recv()));
+    match futures::future::select(next, serving).await {
+        Either::Left((request, serving)) => {
+            _ = end_serving.send(());
+            serving.await;
+            request
+        }
+        Either::Right(((), next)) => next.await,
+    }
+}
+
+/// Stops the axes and waits until they are at rest; false after a timeout.
+pub(super) async fn deactivate(
+    commands: &mpsc::Sender<Command>,
+    (id, stop): (MotionId, Option<Arc<Trajectory>>),
+) -> bool {
+    let (done, is_done) = oneshot::channel();
+    if commands.send(Command::Deactivate { id, stop, done }).await.is_err() {
+        return false;
+    }
+    timeout(STOP_TIMEOUT, is_done).await.is_ok_and(|done| done.is_ok())
+}
