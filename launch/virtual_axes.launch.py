@@ -38,6 +38,12 @@ ARGUMENTS = [
         ["true", "false"],
         "Receive trajectories on ~/joint_trajectory instead of psec, as a joint_trajectory_controller with this `name`",
     ),
+    (
+        "lifecycle",
+        "false",
+        ["true", "false"],
+        "Start as a managed node, which `ros2 lifecycle` or a manager configures and activates",
+    ),
     ("joint_prefix", "", None, "Prefix of the joint names"),
     ("frame_prefix", "", None, "Prefix of the frame names, as in cell/"),
     (
@@ -173,6 +179,7 @@ def start(context: LaunchContext) -> list[object]:
             name=name,
             namespace=namespace,
             parameters=[str(machine), parameters],
+            arguments=["--lifecycle"] if argument["lifecycle"] == "true" else [],
             remappings=[("psec", "~/joint_trajectory")] if argument["jtc_names"] == "true" else [],
             ros_arguments=["--log-level", argument["log_level"]],
             output="screen",

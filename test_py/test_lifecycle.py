@@ -139,6 +139,18 @@ def test_the_life_of_a_node(process: Node, manager: Manager) -> None:
         go_home(drive)
 
 
+def test_with_its_own_clock_the_time_goes_on_while_inactive() -> None:
+    with Node(["-p", "time:=fast", "--", "--lifecycle"]) as process, Manager(process) as manager:
+        with operating(process, manager) as drive:
+            before = drive.run(joint_trajectory(["x"], [1.0], [[0.05]], [[0.0]])).time[-1]
+            assert manager.change("deactivate")
+            assert drive.decision(drive.send(joint_trajectory(["x"], [1.0], [[0.01]]))).code == R.NOT_ACTIVE
+            assert manager.change("activate")
+            recording = drive.run(joint_trajectory(["x"], [1.0], [[0.0]], [[0.0]]))
+            assert recording.result.status == R.COMPLETED and recording.time[0] > before
+        assert process.stop() == 0
+
+
 def test_a_deactivation_stops_within_the_limits(process: Node, manager: Manager) -> None:
     with operating(process, manager) as drive:
         go_home(drive)

@@ -35,6 +35,12 @@ fn without_arguments_the_node_has_its_default_name() {
 fn help_and_version_apply_outside_ros_args_only() {
     assert_eq!(parse("--help"), Ok(Command::Help));
     assert_eq!(parse("-h --version"), Ok(Command::Help));
+    for (arguments, is_managed) in
+        [("", false), ("--lifecycle", true), ("--ros-args -r a:=b -- --lifecycle", true)]
+    {
+        let Ok(Command::Run(args)) = parse(arguments) else { panic!("{arguments}") };
+        assert_eq!(args.is_managed(), is_managed, "{arguments}");
+    }
     assert_eq!(parse("--ros-args -r a:=b -- --version"), Ok(Command::Version));
     assert!(rejection("--ros-args --help").contains("--help"));
 }
