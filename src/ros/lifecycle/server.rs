@@ -111,7 +111,7 @@ impl LifecycleServer {
                     let response = self.change.respond(id, ChangeStateResponse { success: is_successful }, permit);
                     responses.push(Box::pin(async {
                         response.await;
-                        // The receiver is dropped if nobody waits.
+                        // The receiver is dropped without a waiting task.
                         let _ = answered.send(());
                     }));
                 }
