@@ -1,0 +1,216 @@
+/// Host that makes the calls of the controller manager: configure, activate, then read, update and write in a loop.
+///
+/// `host motion` prints lines of a name and a number; `host errors` prints the log of rejected hardware blocks.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "virtual_axes_ros2_control/virtual_axes_system.hpp"
+
+namespace
+{
+
+using hardware_interface::CallbackReturn;
+using hardware_interface::return_type;
+using virtual_axes_ros2_control::VirtualAxesSystem;
+
+constexpr std::size_t AXES = 5;
+constexpr std::int64_t TSP_NS = 6'000'000;
+constexpr std::int64_t DURATION_NS = 60'000'000'000;
+const std::array<std::string, AXES> NAMES = {"x", "y", "z", "a", "c"};
+const std::array<std::string, 5> SIGNALS = {"position", "velocity", "effort", "current", "following_error"};
+using Row = std::array<double, AXES * 5>;
+using Motion = std::map<std::int64_t, Row>;
+
+/// Returns the commanded position: a circular motion that starts at rest, 20 mm or 0.2 rad.
+double wanted(std::size_t axis, std::int64_t time_ns)
+{
+  const double angle = 3.0 * 1e-9 * static_cast<double>(time_ns);
+  const double amplitude = axis < 3 ? 0.02 : 0.2;
+  return amplitude / static_cast<double>(1 + axis % 3) * (1.0 - std::cos(angle));
+}
+
+hardware_interface::HardwareInfo mill()
+{
+  hardware_interface::HardwareInfo info;
+  info.name = "mill";
+  info.hardware_parameters = {{"machine", "mikron_ucp710"}};
+  for (const auto & name : NAMES) {
+    hardware_interface::ComponentInfo joint;
+    joint.name = name;
+    joint.command_interfaces = {{"position"}};
+    for (const auto & signal : SIGNALS) {
+      joint.state_interfaces.push_back({signal});
+    }
+    info.joints.push_back(joint);
+  }
+  return info;
+}
+
+void require(bool condition, const char * text)
+{
+  if (!condition) {
+    std::fprintf(stderr, "host: %s\n", text);
+    std::exit(1);
+  }
+}
+
+/// Runs the loop and returns the states at the position cycles.
+Motion run(std::int64_t period_ns)
+{
+  VirtualAxesSystem system;
+  require(system.on_init(mill()) == CallbackReturn::SUCCESS, "on_init");
+  require(system.on_configure({}) == CallbackReturn::SUCCESS, "on_configure");
+  require(system.on_activate({}) == CallbackReturn::SUCCESS, "on_activate");
+  std::vector<std::string> start;
+  for (const auto & name : NAMES) {
+    require(system.get_command(name + "/position") == 0.0, "commands are positions after on_activate");
+    start.push_back(name + "/position");
+  }
+  require(system.prepare_command_mode_switch(start, {}) == return_type::OK, "prepare_command_mode_switch");
+  require(system.perform_command_mode_switch(start, {}) == return_type::OK, "perform_command_mode_switch");
+  Motion motion;
+  for (std::int64_t now = period_ns; now <= DURATION_NS; now += period_ns) {
+    require(system.read({now}, {period_ns}) == return_type::OK, "read");
+    // The state is that at the present time, or at the position cycle since the last call.
+    const std::int64_t cycle = now / TSP_NS * TSP_NS;
+    if (cycle > now - period_ns) {
+      Row & row = motion[cycle];
+      for (std::size_t axis = 0; axis < AXES; ++axis) {
+        for (std::size_t signal = 0; signal < 5; ++signal) {
+          row[5 * axis + signal] = system.get_state(NAMES[axis] + "/" + SIGNALS[signal]);
+        }
+      }
+    }
+    for (std::size_t axis = 0; axis < AXES; ++axis) {
+      system.set_command(NAMES[axis] + "/position", wanted(axis, now));
+    }
+    require(system.write({now}, {period_ns}) == return_type::OK, "write");
+  }
+  require(system.on_deactivate({}) == CallbackReturn::SUCCESS, "on_deactivate");
+  require(system.on_cleanup({}) == CallbackReturn::SUCCESS, "on_cleanup");
+  return motion;
+}
+
+/// Returns the states of the same motion by the C interface alone, one position cycle a step.
+Motion reference()
+{
+  VaMachine * machine = nullptr;
+  require(va_create("mikron_ucp710", &machine) == VA_OK, "va_create");
+  Motion motion;
+  for (std::int64_t now = 0; now < DURATION_NS; now += TSP_NS) {
+    std::array<double, AXES> psec;
+    for (std::size_t axis = 0; axis < AXES; ++axis) {
+      psec[axis] = wanted(axis, now);
+    }
+    require(va_step(machine, psec.data(), AXES) == VA_OK, "va_step");
+    Row & row = motion[now + TSP_NS];
+    for (std::size_t axis = 0; axis < AXES; ++axis) {
+      VaSignals s;
+      require(va_signals(machine, axis, &s) == VA_OK, "va_signals");
+      const std::array<double, 5> values = {s.position, s.velocity, s.effort, s.current, s.following_error};
+      std::copy(values.begin(), values.end(), row.begin() + static_cast<std::ptrdiff_t>(5 * axis));
+    }
+  }
+  va_destroy(machine);
+  return motion;
+}
+
+/// Prints the number of compared times, of different states, and the largest differences of the setpoints and positions.
+void compare(const char * name, const Motion & found, const Motion & wanted)
+{
+  std::size_t count = 0, different = 0;
+  std::array<double, AXES> setpoints{}, positions{};
+  for (const auto & [time, row] : found) {
+    const auto place = wanted.find(time);
+    if (place == wanted.end()) {
+      continue;
+    }
+    ++count;
+    different += std::memcmp(row.data(), place->second.data(), sizeof(Row)) != 0;
+    for (std::size_t axis = 0; axis < AXES; ++axis) {
+      const double position = row[5 * axis] - place->second[5 * axis];
+      const double error = row[5 * axis + 4] - place->second[5 * axis + 4];
+      positions[axis] = std::fmax(positions[axis], std::fabs(position));
+      setpoints[axis] = std::fmax(setpoints[axis], std::fabs(position + error));
+    }
+  }
+  std::printf("%s %zu %zu", name, count, different);
+  for (const auto & largest : {setpoints, positions}) {
+    for (const double value : largest) {
+      std::printf(" %.6e", value);
+    }
+  }
+  std::printf("\n");
+}
+
+/// Checks that a hardware block is rejected; the log has the reason.
+void rejected(const hardware_interface::HardwareInfo & info)
+{
+  VirtualAxesSystem system;
+  require(system.on_init(info) == CallbackReturn::ERROR, "this block must be rejected");
+}
+
+void errors()
+{
+  for (const auto & [name, value] : std::vector<std::pair<std::string, std::string>>{
+      {"machine", ""}, {"machine", "nowhere.yaml"}, {"controller", "pid"}, {"joints", "x y"},
+      {"joints", "x, x, z, a, c"}, {"joint_prefix", "left_"}})
+  {
+    auto info = mill();
+    info.hardware_parameters[name] = value;
+    rejected(info);
+  }
+  auto info = mill();
+  info.joints[1].command_interfaces = {{"velocity"}};
+  rejected(info);
+  info = mill();
+  info.joints[2].state_interfaces.push_back({"acceleration"});
+  rejected(info);
+  info = mill();
+  info.joints.push_back(info.joints[0]);
+  rejected(info);
+  VirtualAxesSystem system;
+  require(system.on_init(mill()) == CallbackReturn::SUCCESS, "on_init");
+  require(system.on_configure({}) == CallbackReturn::SUCCESS, "on_configure");
+  require(system.on_activate({}) == CallbackReturn::SUCCESS, "on_activate");
+  require(system.prepare_command_mode_switch({"x/velocity"}, {}) == return_type::ERROR, "velocity is rejected");
+  require(system.prepare_command_mode_switch({"gripper/effort"}, {}) == return_type::OK, "other hardware");
+  // Without a command, and with one that is not finite, the axes stay; a long pause is cut.
+  system.set_command("x/position", std::nan(""));
+  for (const std::int64_t period : {2'000'000L, -5L, 0L, 3'600'000'000'000L}) {
+    require(system.read({0}, {period}) == return_type::OK, "read");
+    require(system.write({0}, {period}) == return_type::OK, "write");
+  }
+  require(std::fabs(system.get_state("x/position")) < 1e-9, "the axis stays");
+  // The built-in machine has no polynomials for rst.
+  for (const std::string controller : {"cascade", "gpc", "rst"}) {
+    auto with = mill();
+    with.hardware_parameters["controller"] = controller;
+    with.hardware_parameters["joints"] = "m1, m2, m3, m4, m5";
+    with.joints.resize(1);
+    with.joints[0].name = "m2";
+    VirtualAxesSystem other;
+    require((other.on_init(with) == CallbackReturn::SUCCESS) == (controller != "rst"), controller.c_str());
+  }
+}
+
+}  // namespace
+
+int main(int count, char ** words)
+{
+  if (count == 2 && std::strcmp(words[1], "errors") == 0) {
+    errors();
+    return 0;
+  }
+  const Motion at_1000 = run(1'000'000);
+  compare("1000_and_c", at_1000, reference());
+  compare("500_and_1000", run(2'000'000), at_1000);
+  compare("167_and_1000", run(1'000'000'000 / 167), at_1000);
+}

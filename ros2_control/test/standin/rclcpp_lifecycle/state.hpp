@@ -1,0 +1,9 @@
+/// Stand-in of rclcpp_lifecycle::State.
+#pragma once
+
+namespace rclcpp_lifecycle
+{
+struct State
+{
+};
+}
