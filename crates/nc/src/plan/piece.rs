@@ -12,6 +12,22 @@ pub(super) enum PieceCurve {
     Exact(Element),
 }
 
+/// Bound on the feed along a part of a piece; places from the start of the piece.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CapSpan {
+    pub from: f64,
+    pub to: f64,
+    pub cap: FeedCap,
+}
+
+/// Place where the programmed feed changes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FeedChange {
+    pub at: f64,
+    /// Bounds before and after it.
+    pub caps: [FeedCap; 2],
+}
+
 /// Smooth piece of the path.
 #[derive(Debug, Clone)]
 pub(super) struct Piece {
@@ -19,7 +35,9 @@ pub(super) struct Piece {
     pub length: f64,
     /// Path parameter at the start, from the start of the program.
     pub start: f64,
-    pub caps: Vec<FeedCap>,
+    pub caps: Vec<CapSpan>,
+    /// Changes of the feed inside and near the piece in order, from its start.
+    pub changes: Vec<FeedChange>,
     pub line: usize,
     /// True if adjacent pieces differ in length.
     pub is_graded: bool,
@@ -65,7 +83,8 @@ impl Piece {
 
     /// Multiplies the programmed feeds by `factor`.
     pub fn scale_feed(&mut self, factor: f64) {
-        for cap in &mut self.caps {
+        let spans = self.caps.iter_mut().map(|span| &mut span.cap);
+        for cap in spans.chain(self.changes.iter_mut().flat_map(|change| &mut change.caps)) {
             match cap {
                 FeedCap::Rapid => {}
                 FeedCap::Speed { value, .. } | FeedCap::Rate(value) => *value *= factor,
@@ -73,8 +92,9 @@ impl Piece {
         }
     }
 
-    /// Returns the largest rate of the path parameter at a point with the first derivative `first`.
-    pub fn cap(&self, first: &JointVector) -> f64 {
-        self.caps.iter().map(|cap| cap.rate(first)).fold(f64::INFINITY, f64::min)
+    /// Returns the largest rate of the path parameter between two places, where it has the first derivative `first`.
+    pub fn cap(&self, [from, to]: [f64; 2], first: &JointVector) -> f64 {
+        let spans = self.caps.iter().filter(|span| span.from <= to && from <= span.to);
+        spans.map(|span| span.cap.rate(first)).fold(f64::INFINITY, f64::min)
     }
 }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use super::element::Element;
 use super::error::{FeedPlanError, StepError};
-use super::piece::{Piece, PieceCurve};
+use super::piece::{CapSpan, Piece, PieceCurve};
 use super::run::Run;
 use super::source::{Part, PartSource};
 use super::vector::difference;
@@ -103,7 +103,8 @@ where
         Piece {
             length: element.length,
             start,
-            caps: vec![element.cap],
+            caps: vec![CapSpan { from: 0.0, to: element.length, cap: element.cap }],
+            changes: Vec::new(),
             line: element.line,
             is_graded: false,
             tcp_length: element.tcp_length,

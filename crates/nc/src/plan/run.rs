@@ -9,8 +9,8 @@
 
 use std::collections::VecDeque;
 
-use super::element::{Element, FeedCap, JointKinds};
-use super::piece::{Piece, PieceCurve};
+use super::element::{Element, JointKinds};
+use super::piece::{CapSpan, FeedChange, Piece, PieceCurve};
 use super::source::BlendTolerance;
 use super::vector::{Jet, JointVector, norm};
 
@@ -29,6 +29,10 @@ const MAX_HALVINGS: u32 = 14;
 const END_FRACTION: f64 = 1.0 / 256.0;
 /// Number of vertices inside an interval at which the deviation is computed.
 const MAX_VERTICES: usize = 16;
+/// Number of changes of the feed in a piece up to which each part of the piece has its own.
+const MAX_CHANGES: usize = 8;
+/// Distance from a change of the feed in which the intervals are graded, as a multiple of the largest knot distance.
+const GRADED_DISTANCE: f64 = 4.0;
 
 struct Member {
     start: f64,
@@ -39,6 +43,8 @@ struct Member {
 /// Blended curves between two stops.
 pub(super) struct Run {
     members: VecDeque<Member>,
+    /// Places where the feed changes.
+    changes: VecDeque<FeedChange>,
     /// Path parameter at the start of the run, from the start of the program.
     origin: f64,
     /// Length of the curves added.
@@ -64,14 +70,19 @@ impl Run {
     /// Creates a run that starts at `origin`, with a largest knot distance.
     pub fn new(origin: f64, largest: f64) -> Self {
         let knots = VecDeque::from([0.0; 3]);
-        let (members, block) = (VecDeque::new(), vec![]);
-        Self { members, origin, length: 0.0, stop: None, knots, block, planned: 0.0, largest }
+        let (members, changes, block) = (VecDeque::new(), VecDeque::new(), vec![]);
+        Self { members, changes, origin, length: 0.0, stop: None, knots, block, planned: 0.0, largest }
     }
 
     /// Appends a curve with the tolerance that applies at its end.
     pub fn push(&mut self, element: Element, tolerance: Option<BlendTolerance>) {
         let before = self.members.back().map_or([f64::INFINITY; 2], |member| member.tolerance);
         let start = self.length;
+        if let Some(last) =
+            self.members.back().map(|member| member.element.cap).filter(|cap| *cap != element.cap)
+        {
+            self.changes.push_back(FeedChange { at: start, caps: [last, element.cap] });
+        }
         self.length += element.length;
         self.members.push_back(Member { start, element, tolerance: tolerance.unwrap_or(before) });
     }
@@ -119,6 +130,10 @@ impl Run {
         let keep = self.knots[0] - 2.0 * self.largest;
         while self.members.len() > 1 && self.members[1].start < keep {
             self.members.pop_front();
+        }
+        let keep = self.knots[0] - GRADED_DISTANCE * self.largest;
+        while self.changes.front().is_some_and(|change| change.at < keep) {
+            self.changes.pop_front();
         }
         Some(piece)
     }
@@ -316,23 +331,42 @@ impl Run {
         std::array::from_fn(|i| low.tolerance[i].min(high.tolerance[i]))
     }
 
+    /// Returns the bounds on the feed between two knots, and the changes of the feed there and nearby. Of a piece with
+    /// many changes, the least feed applies to all of it.
+    fn feeds(&self, from: f64, to: f64) -> (Vec<CapSpan>, Vec<FeedChange>) {
+        let place = |at: f64| self.changes.partition_point(|change| change.at <= at);
+        let (first, last) = (place(from), self.changes.partition_point(|change| change.at < to));
+        let mut spans = Vec::with_capacity(2);
+        let mut start =
+            CapSpan { from: 0.0, to: to - from, cap: self.members[self.index_at(from)].element.cap };
+        for change in self.changes.range(first..last.max(first)) {
+            spans.push(CapSpan { to: change.at - from, ..start });
+            start = CapSpan { from: change.at - from, to: to - from, cap: change.caps[1] };
+        }
+        spans.push(start);
+        if spans.len() > MAX_CHANGES + 1 {
+            spans.iter_mut().for_each(|span| (span.from, span.to) = (0.0, to - from));
+            return (spans, Vec::new());
+        }
+        let distance = GRADED_DISTANCE * self.largest;
+        let begin = place(from - distance).max(first.saturating_sub(MAX_CHANGES));
+        let end = place(to + distance).min(last + MAX_CHANGES);
+        let near = self.changes.range(begin..end.max(begin));
+        (spans, near.map(|change| FeedChange { at: change.at - from, ..*change }).collect())
+    }
+
     /// Returns the piece between two knots, from the knots around it.
     fn piece(&self, from: f64, to: f64) -> Piece {
         let jet = self.cubic(&std::array::from_fn(|i| self.knots[i]));
-        let (first, last) = (self.index_at(from), self.index_at(to));
-        let mut caps: Vec<FeedCap> = Vec::new();
-        for member in self.members.range(first..=last) {
-            if caps.last() != Some(&member.element.cap) && !caps.contains(&member.element.cap) {
-                caps.push(member.element.cap);
-            }
-        }
-        let member = &self.members[first];
+        let member = &self.members[self.index_at(from)];
+        let (caps, changes) = self.feeds(from, to);
         let is_last = self.is_closed() && to >= self.length;
         Piece {
             curve: PieceCurve::Cubic(jet),
             length: to - from,
             start: self.origin + from,
             caps,
+            changes,
             line: member.element.line,
             is_graded: (0..5)
                 .any(|i| (self.knots[i + 1] - self.knots[i] - (to - from)).abs() > 0.01 * (to - from)),

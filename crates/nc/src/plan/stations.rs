@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::element::JointKinds;
-use super::piece::{Piece, PieceCurve};
+use super::piece::{FeedChange, Piece, PieceCurve};
 use super::vector::{Jet, TipToJoints};
 use super::window::{Interval, JointBounds, Node};
 
@@ -16,6 +16,10 @@ const PHASE_FRACTION: f64 = 1.0 / 8.0;
 /// Intervals per spline piece, and where adjacent pieces differ in length: near corners.
 const PARTS: usize = 3;
 const GRADED_PARTS: usize = 4;
+/// Ratio of two programmed feeds below which the intervals between them are graded.
+const FEED_CHANGE: f64 = 0.9;
+/// Smallest interval at a change of the feed, m.
+const MIN_INTERVAL: f64 = 1e-8;
 /// Largest turn of an arc or of a rotary axis per interval of an exact curve, rad.
 const TURN: f64 = 0.1;
 /// Largest number of intervals of one piece.
@@ -55,7 +59,7 @@ impl MachineModel {
     /// Returns the joint derivatives and the largest rate of the path parameter at `u`.
     pub fn node(&self, piece: &Piece, u: f64) -> (Node, f64) {
         let mut jet = piece.jet(u);
-        let mut cap = piece.cap(&jet[1]);
+        let mut cap = piece.cap([u; 2], &jet[1]);
         if self.centripetal.is_finite() {
             let bend = super::vector::norm(&jet[2], &self.kinds.linear);
             cap = cap.min((self.centripetal / bend).sqrt());
@@ -77,6 +81,21 @@ impl MachineModel {
             limits[1] = limits[1].min(bounds.jerk / first.abs());
         }
         limits
+    }
+
+    /// Returns the places near `piece` where the feed changes by more than a little, with the length of the intervals
+    /// there, which last `time` at the lower feed. `node` is that of the start of the piece.
+    fn feed_changes(&self, piece: &Piece, node: &Node, time: f64) -> Vec<(f64, f64)> {
+        let first = piece.jet(0.0)[1];
+        let bounds = self.joints.iter().zip(&node[0]).map(|(bounds, first)| bounds.velocity / first.abs());
+        let fastest = bounds.fold(f64::INFINITY, f64::min);
+        let change = |change: &FeedChange| {
+            let [before, after] = change.caps.map(|cap| cap.rate(&first).min(fastest));
+            let low = before.min(after);
+            let is_large = low < FEED_CHANGE * before.max(after);
+            is_large.then(|| (change.at, (time * low).max(MIN_INTERVAL)))
+        };
+        piece.changes.iter().filter_map(change).collect()
     }
 
     /// Divides `piece`, which starts `from_stop` after a stop, into intervals.
@@ -101,18 +120,27 @@ impl MachineModel {
             }
         };
         let largest = largest.max(piece.length / MAX_PARTS as f64);
+        let changes = self.feed_changes(piece, &node, PHASE_FRACTION * acceleration / jerk);
         let step = |u: f64| {
             let after = rest + GROWTH * (u + from_stop);
             let before = piece.to_stop.map_or(f64::INFINITY, |to_stop| {
                 (rest + GROWTH * (piece.length - u + to_stop)) / (1.0 + GROWTH)
             });
-            largest.min(after).min(before)
+            let graded = changes.iter().map(|(at, interval)| match *at > u {
+                true => (interval + GROWTH * (at - u)) / (1.0 + GROWTH),
+                false => interval + GROWTH * (u - at),
+            });
+            graded.fold(largest.min(after).min(before), f64::min)
         };
         let mut ends = self.node(piece, 0.0);
         let mut u = 0.0;
         while u < piece.length {
             let h = step(u);
-            let left = piece.length - u;
+            // An interval ends at a change of the feed.
+            let inside = u + MIN_INTERVAL..piece.length - MIN_INTERVAL;
+            let end =
+                changes.iter().map(|(at, _)| *at).find(|at| inside.contains(at)).unwrap_or(piece.length);
+            let left = end - u;
             let h = if left < 1.2 * h {
                 left
             } else if left < 2.0 * h {
@@ -120,13 +148,18 @@ impl MachineModel {
             } else {
                 h
             };
-            let to = if h == left { piece.length } else { u + h };
+            let to = if h == left { end } else { u + h };
             let next = self.node(piece, to);
             let middle = self.node(piece, 0.5 * (u + to)).1;
+            let feed = match piece.caps.len() {
+                // The nodes have it.
+                1 => f64::INFINITY,
+                _ => piece.cap([u, to], &piece.jet(u)[1]),
+            };
             let interval = Interval {
                 length: h,
                 ends: [ends.0, next.0],
-                cap: ends.1.min(next.1).min(middle),
+                cap: ends.1.min(next.1).min(middle).min(feed),
                 share: SHARE,
             };
             out.push(Station { interval, piece: Arc::clone(piece), from: u });

@@ -49,6 +49,62 @@ proptest! {
     }
 }
 
+/// Returns the time along lines of the given lengths and feeds in one direction with the shortest ramps between constant
+/// feeds.
+fn closed_form_of_feeds(parts: &[(f64, f64)], a: f64, j: f64) -> f64 {
+    let feeds: Vec<f64> = [0.0].into_iter().chain(parts.iter().map(|part| part.1)).chain([0.0]).collect();
+    let change = |pair: &[f64]| {
+        let w = (pair[1] - pair[0]).abs();
+        if w * j >= a * a { w / a + a / j } else { 2.0 * (w / j).sqrt() }
+    };
+    let mut time: f64 = parts.iter().map(|(length, feed)| length / feed).sum();
+    // A ramp is on the side of the larger feed.
+    for pair in feeds.windows(2) {
+        let ramp = change(pair);
+        time += ramp - 0.5 * (pair[0] + pair[1]) * ramp / pair[0].max(pair[1]);
+    }
+    time
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    /// A change of the feed costs no more than its ramp, on the side of the larger feed.
+    #[test]
+    fn feeds_change_at_their_places(
+        feeds in prop::collection::vec(-2.8..-0.7f64, 2..5), tolerance in -6.0..-3.0f64, short in 0..3_usize,
+    ) {
+        let parts: Vec<(f64, f64)> = feeds.iter().map(|feed| 10f64.powf(*feed)).map(|feed| (0.08, feed)).collect();
+        let x = *machine().axes()[0].limits();
+        for control in [PathControl::ExactPath, blend(10f64.powf(tolerance))] {
+            let mut program = Program::new(0.1, control);
+            let mut at = 0.0;
+            for (length, feed) in &parts {
+                program.feed = *feed;
+                // Short lines in a row are one line.
+                let lines = [1, 7, 40][short];
+                for i in 1..=lines {
+                    program.line(at + length * f64::from(i) / f64::from(lines), 0.0, 0.0);
+                }
+                at += length;
+            }
+            let outcome = plan(&program);
+            outcome.audit.assert_kept();
+            let expected = closed_form_of_feeds(&parts, x.acceleration, x.jerk);
+            let excess = outcome.path_time - expected;
+            // A later ramp that passes below the lower feed after the change saves a little time.
+            prop_assert!(excess.abs() < 0.01 * expected, "{} {expected}", outcome.path_time);
+            // No setpoint is faster than the feed of its place.
+            for pair in outcome.setpoints.windows(2) {
+                let [from, to] = [0, 1].map(|i| pair[i].psec()[0]);
+                let place = |x: f64| ((x / 0.08) as usize).min(parts.len() - 1);
+                let allowed = parts[place(from)].1.max(parts[place(to)].1);
+                prop_assert!((to - from) <= 0.006 * allowed * (1.0 + 1e-6) + 1e-12, "{from} {to} {allowed}");
+            }
+        }
+    }
+}
+
 #[test]
 fn exact_stops_add_up() {
     let mut program = Program::new(0.1, PathControl::ExactStop);
