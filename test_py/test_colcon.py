@@ -110,3 +110,24 @@ def test_a_missing_program_is_an_error(tmp_path: Path, workspace: Workspace, mis
     assert done.returncode != 0
     # CMake breaks the lines of its messages.
     assert f'cannot find "{tmp_path}/{missing}"' in " ".join((done.stdout + done.stderr).split())
+
+
+def test_the_plugin_of_ros2_control_is_built_where_its_headers_are_found(workspace: Workspace):
+    """Without them, it is skipped with one line; with stand-ins, library and description are installed."""
+    log = workspace.folder / "log" / "latest_build" / "virtual_axes" / "stdout.log"
+    library = workspace.folder / "install/virtual_axes/lib/libvirtual_axes_ros2_control.so"
+    own = ["-DVIRTUAL_AXES_BUILD_NODE=ON", "-DVIRTUAL_AXES_BINARY_DIR="]
+    done = workspace.build(*own)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert log.read_text().count("ros2_control plugin skipped: hardware_interface, pluginlib,") == 1
+    assert not library.exists()
+    standin = workspace.source / "ros2_control/test/standin/cmake"
+    packages = ("hardware_interface", "pluginlib", "rclcpp", "rclcpp_lifecycle")
+    done = workspace.build(*own, *(f"-D{package}_DIR={standin}" for package in packages))
+    assert done.returncode == 0, done.stdout + done.stderr
+    symbols = subprocess.run(["nm", "-DC", library], capture_output=True, text=True, check=True).stdout
+    assert "T virtual_axes_ros2_control::VirtualAxesSystem::write" in symbols
+    assert " va_step_for_ns" not in symbols
+    share = workspace.folder / "install/virtual_axes/share/virtual_axes/ros2_control"
+    files = sorted(str(path.relative_to(share)) for path in share.rglob("*") if path.is_file())
+    assert files == ["config/controllers.yaml", "config/mikron_ucp710.ros2_control.xml", "virtual_axes_system.xml"]

@@ -25,6 +25,8 @@ const std::vector<std::pair<std::string, double VaSignals::*>> STATES = {
   {"following_error", &VaSignals::following_error},
 };
 
+const std::vector<std::string> PARAMETERS = {"machine", "controller", "joints", "joint_prefix"};
+
 const std::vector<std::string> CONTROLLERS = {"cascade", "gpc", "rst"};
 
 /// Returns a parameter of the `<hardware>` block, or an empty text.
@@ -71,6 +73,14 @@ CallbackReturn VirtualAxesSystem::on_init(const hardware_interface::HardwareInfo
   command_names_.clear();
   command_axes_.clear();
   outputs_.clear();
+  // The framework and other tools have parameters of their own in this block.
+  for (const auto & [name, value] : info.hardware_parameters) {
+    if (std::find(PARAMETERS.begin(), PARAMETERS.end(), name) == PARAMETERS.end()) {
+      RCLCPP_WARN(
+        get_logger(), "parameter %s = %s is not read; this plugin reads %s", name.c_str(), value.c_str(),
+        list_of(PARAMETERS).c_str());
+    }
+  }
   try {
     machine_ = parameter(info, "machine");
     controller_ = parameter(info, "controller");

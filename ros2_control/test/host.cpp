@@ -176,8 +176,10 @@ void errors()
   info = mill();
   info.joints.push_back(info.joints[0]);
   rejected(info);
+  info = mill();
+  info.hardware_parameters["controler"] = "gpc";
   VirtualAxesSystem system;
-  require(system.on_init(mill()) == CallbackReturn::SUCCESS, "on_init");
+  require(system.on_init(info) == CallbackReturn::SUCCESS, "on_init");
   require(system.on_configure({}) == CallbackReturn::SUCCESS, "on_configure");
   require(system.on_activate({}) == CallbackReturn::SUCCESS, "on_activate");
   require(system.prepare_command_mode_switch({"x/velocity"}, {}) == return_type::ERROR, "velocity is rejected");

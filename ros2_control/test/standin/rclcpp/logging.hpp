@@ -1,4 +1,4 @@
-/// Stand-in of rclcpp's log macros: errors go to standard error.
+/// Stand-in of rclcpp's log macros: errors and warnings go to standard error.
 #pragma once
 
 #include <cstdio>
@@ -16,3 +16,5 @@ struct Logger
     std::fprintf(stderr, __VA_ARGS__); \
     std::fputc('\n', stderr); \
   } while (false)
+
+#define RCLCPP_WARN(logger, ...) RCLCPP_ERROR(logger, __VA_ARGS__)
