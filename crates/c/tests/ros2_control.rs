@@ -37,6 +37,7 @@ fn host(mode: &str) -> Output {
 fn a_minute_at_three_update_rates_is_the_same_motion() {
     let output = host("motion");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    println!("comparison, times, different states, differences of setpoints and positions by axis:\n{text}");
     let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(' ').collect()).collect();
     assert_eq!(rows.len(), 3, "{text}");
     // At 500 Hz and 1 kHz a command is given at each position cycle: bit-identical to va_step with these setpoints.
