@@ -269,6 +269,35 @@ def test_two_processes_share_a_search(machine: va.Machine, tmp_path: Path) -> No
     found = va.optimize(machine, va.scenario("corner-90"), SEARCHED, "contour_error_um.rms", trials=96, storage=journal)
     assert len(found.study.trials) == len(finished)
     assert found.value == min(values)
+    others = {
+        "motion": {"motion": va.scenario("x-constant")},
+        "machine": {"machine": machine.with_({"x.velocity_loop.gain": 4.0})},
+        "parameters": {"parameters": dict.fromkeys(SEARCHED, (1, 2))},
+        "constraints": {"constraints": {"axes.x.peak_current_a": (None, 40.0)}},
+        "objective": {"objective": "contour_error_um.max"},
+    }
+    given = {"machine": machine, "motion": va.scenario("corner-90"), "parameters": SEARCHED}
+    for differing, changes in others.items():
+        with pytest.raises(ValueError, match=f"another study 'study': {differing} differ"):
+            va.optimize(**{**given, "objective": "contour_error_um.rms", **changes}, trials=96, storage=journal)
+
+
+def test_an_unknown_parameter_of_random_variants_is_an_error(machine: va.Machine) -> None:
+    variants = va.random_variants(seed=1, n=10, bounds={"x.position_loop.gian": (1.0, 2.0)})
+    with pytest.raises(ValueError, match=r"unknown parameter x.position_loop.gian; the nearest is"):
+        va.sweep(machine, variants, va.scenario("x-constant"))
+
+
+def test_a_search_draws_numbers_of_the_kind_of_the_parameter(machine: va.Machine) -> None:
+    """Whatever the kind of the bounds; bounds of a whole number must be whole."""
+    gpc = machine.with_({"x.position_loop.controller": "gpc"})
+    bounds = {"x.position_loop.gpc.n2": (12.0, 16.0), "x.feedforward.velocity": (0, 1)}
+    found = va.optimize(gpc, va.scenario("x-constant"), bounds, "duration_s", trials=8, batch=8, seed=1)
+    drawn = [trial.params for trial in found.study.trials]
+    assert all(isinstance(one["x.position_loop.gpc.n2"], int) for one in drawn)
+    assert any(0 < one["x.feedforward.velocity"] < 1 for one in drawn)
+    with pytest.raises((TypeError, ValueError), match="n2, bound 12.5"):
+        va.optimize(gpc, va.scenario("x-constant"), {"x.position_loop.gpc.n2": (12.5, 16)}, "duration_s", trials=1)
 
 
 @pytest.mark.parametrize(

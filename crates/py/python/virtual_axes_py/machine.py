@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from .arguments import to_floats
 from .run import Run
 
 if TYPE_CHECKING:
-    Setpoints = NDArray[np.float64] | Mapping[str, Sequence[float]] | _native.Scenario | _native.PartProgram
+    Setpoints = NDArray[np.float64] | Mapping[str, ArrayLike] | _native.Scenario | _native.PartProgram
     Parameter = bool | int | float | str | Sequence[bool] | Sequence[int] | Sequence[float] | Sequence[str]
 
 SIGNALS = (

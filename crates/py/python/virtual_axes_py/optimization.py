@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import design
-from .chunks import SweepResult, flat
+from .arguments import to_whole
+from .chunks import Setup, SweepResult, flat
 from .machine import Machine
-from .study import sweep
+from .shards import setup_identity
+from .study import planned, sweep
 
 if TYPE_CHECKING:
     import optuna
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from .machine import Setpoints
 
 Bounds = tuple[float, float] | tuple[float, float, str]
-"""Lowest and highest value, and `log` for a logarithmic scale; two integers for an integer."""
+"""Lowest and highest value, and `log` for a logarithmic scale."""
 MARGINS = ("modulus", "phase", "gain", "gain_reduction", "delay")
 
 
@@ -56,17 +58,19 @@ def optimize(
 ) -> Optimum:
     """Searches for the parameters with the smallest objective on a motion, by Optuna's TPE (extra `optuna`).
 
-    `parameters` have bounds `(low, high)`, or `(low, high, "log")`. `objective` is the key of a figure, as
-    `contour_error_um.max`, or a function of the figures. `constraints` are bounds `(low, high)`, of which one may be
-    None, of figures and of the stability margins `margin.modulus`, `margin.phase` (rad), `margin.gain`,
-    `margin.gain_reduction` and `margin.delay` (s), the smallest of the axes in `parameters`.
+    `parameters` have bounds `(low, high)`, or `(low, high, "log")`; those of whole numbers are whole. `objective` is
+    the key of a figure, as `contour_error_um.max`, or a function of the figures. `constraints` are bounds
+    `(low, high)`, of which one may be None, of figures and of the stability margins `margin.modulus`, `margin.phase`
+    (rad), `margin.gain`, `margin.gain_reduction` and `margin.delay` (s), the smallest of the axes in `parameters`.
 
     The first trial is the machine as it is, if within the bounds. Each `batch` is asked for at once and simulated by
     `sweep`, with `figures`, `executor` and `threads`. `storage` is a journal file: processes with the same file and
     `name` share a study, whose `trials` are counted together (up to one batch per process more), and a later call
-    continues it. The result is the best trial so far; other processes may still be at work.
+    continues it: machine, motion, figures, parameters with bounds, constraints and the key of the objective must be
+    equal. The result is the best trial so far; other processes may still be at work.
 
-    Raises `ValueError` for an unknown parameter, figure or margin, or if no trial fulfills the constraints.
+    Raises `ValueError` for an unknown parameter, figure or margin, for a `storage` with another study of this name,
+    naming what differs, or if no trial fulfills the constraints.
     """
     if trials < 1 or batch < 1:
         raise ValueError(f"trials {trials}, batch {batch}: must be at least 1")
@@ -74,13 +78,20 @@ def optimize(
     unknown = [key for key in limits if key.startswith("margin.") and key[7:] not in MARGINS]
     if unknown:
         raise ValueError(f"constraint {unknown[0]}: margins are {', '.join(MARGINS)}")
-    study = _open(storage, name, seed)
-    distributions = {key: _distribution(key, bounds) for key, bounds in parameters.items()}
     known = machine.parameters
     missing = [key for key in parameters if key not in known]
     if missing:
         raise ValueError(f"parameter {missing[0]} is unknown")
     start = {key: known[key] for key in parameters}
+    distributions = {key: _distribution(key, bounds, start[key]) for key, bounds in parameters.items()}
+    study = _open(storage, name, seed)
+    if storage is not None:
+        inputs = setup_identity(Setup(machine, planned(machine, motion), figures, 1))
+        inputs["parameters"] = repr(sorted((key, tuple(bounds)) for key, bounds in parameters.items()))
+        inputs["constraints"] = repr(sorted((key, tuple(bounds)) for key, bounds in limits.items()))
+        if isinstance(objective, str):
+            inputs["objective"] = objective
+        _compare(study, inputs, storage)
     if all(bounds[0] <= start[key] <= bounds[1] for key, bounds in parameters.items()):
         study.enqueue_trial(start, skip_if_exists=True)
     axes = [axis for axis in machine.axes if any(key.startswith(f"{axis}.") for key in parameters)]
@@ -113,6 +124,19 @@ def _open(storage: str | Path | None, name: str, seed: int | None) -> optuna.Stu
     return optuna.create_study(storage=journal, sampler=sampler, study_name=name, load_if_exists=journal is not None)
 
 
+def _compare(study: optuna.Study, inputs: dict[str, str], storage: str | Path) -> None:
+    """Stores the inputs of a study; raises `ValueError` if those of its earlier calls differ."""
+    stored = study.user_attrs
+    differing = [key for key, value in inputs.items() if stored.get(key, value) != value]
+    if differing:
+        raise ValueError(
+            f"{storage} has another study {study.study_name!r}: {', '.join(differing)} differ; use another name or file"
+        )
+    for key, value in inputs.items():
+        if key not in stored:
+            study.set_user_attr(key, value)
+
+
 def _chunk(count: int, executor: Client | None) -> int:
     """Returns the number of variants in a chunk, one chunk per thread of a cluster."""
     if executor is None:
@@ -122,16 +146,20 @@ def _chunk(count: int, executor: Client | None) -> int:
     return -(-count // max(cluster.thread_count(executor), 1))
 
 
-def _distribution(key: str, bounds: Bounds) -> optuna.distributions.BaseDistribution:
-    """Returns Optuna's form of bounds."""
+def _distribution(key: str, bounds: Bounds, start: Any) -> optuna.distributions.BaseDistribution:
+    """Returns Optuna's form of the bounds of a parameter with the value `start`."""
     from optuna.distributions import FloatDistribution, IntDistribution
 
     low, high, *scale = bounds
     if not (math.isfinite(low) and math.isfinite(high) and low <= high) or scale not in ([], ["log"]):
         raise ValueError(f'{key}: bounds {bounds} must be finite, the lower one first, and may end with "log"')
-    if isinstance(low, int) and isinstance(high, int):
-        return IntDistribution(low, high, log=bool(scale))
-    return FloatDistribution(low, high, log=bool(scale))
+    if isinstance(start, bool) or not isinstance(start, int | float):
+        raise ValueError(f"{key} is {start!r}; a search needs numbers")
+    if isinstance(start, int):
+        rounded = [int(bound) if float(bound).is_integer() else bound for bound in (low, high)]
+        first, last = (to_whole(f"{key}, bound", bound, -(2**63), 2**63 - 1) for bound in rounded)
+        return IntDistribution(first, last, log=bool(scale))
+    return FloatDistribution(float(low), float(high), log=bool(scale))
 
 
 def _taken(study: optuna.Study) -> int:

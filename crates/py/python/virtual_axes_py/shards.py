@@ -34,14 +34,17 @@ def identity(setup: Setup, variants: Variants, chunk: int) -> dict[str, Any]:
     except PackageNotFoundError:
         package = ""
     return {
-        "machine": _digest([setup.machine.to_yaml()]),
-        "motion": _motion(setup),
+        **setup_identity(setup),
         "variants": _digest(rows),
-        "figures": setup.figures,
         "version": package,
         "rows": len(variants),
         "chunk": chunk,
     }
+
+
+def setup_identity(setup: Setup) -> dict[str, str]:
+    """Returns digests of machine and motion, and the choice of figures."""
+    return {"machine": _digest([setup.machine.to_yaml()]), "motion": _motion(setup), "figures": setup.figures}
 
 
 def _json(variant: Any) -> str:

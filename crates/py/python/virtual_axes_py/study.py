@@ -183,7 +183,7 @@ def sweep(
     directory. `progress` shows the progress on stderr, by default if that is a terminal.
 
     Raises `TypeError` for a parameter of another kind, `ValueError` for invalid setpoints and options, and for a
-    directory with another study, naming what differs.
+    directory with another study, naming what differs; for an unknown parameter of `random_variants`, too.
     """
     to_native(machine)
     if threads is not None:
@@ -194,7 +194,9 @@ def sweep(
         raise ValueError("resume and shard need a directory as out")
     index, count = (0, 1) if shard is None else _shard(shard)
     rows = variants if isinstance(variants, RandomVariants) else _dictionaries(variants)
-    setup = Setup(machine, _planned(machine, psec), figures, _threads(threads, executor))
+    if isinstance(rows, RandomVariants) and len(rows):
+        _check_names(machine, rows[0])
+    setup = Setup(machine, planned(machine, psec), figures, _threads(threads, executor))
     store = None if out is None else shards.Store(Path(out))
     size = chunk or (store.chunk() if store else None) or _chunk_size(setup, rows, executor, count)
     if store:
@@ -225,6 +227,16 @@ def _shard(shard: tuple[int, int]) -> tuple[int, int]:
     return to_whole("shard, job", shard[0], 0, count - 1), count
 
 
+def _check_names(machine: Machine, changes: Mapping[str, Parameter]) -> None:
+    """Raises `ValueError` for a parameter that the machine does not know; a wrong value is an error of its variant."""
+    for name, value in changes.items():
+        try:
+            machine.with_({name: value})
+        except ValueError as error:
+            if "unknown parameter" in str(error):
+                raise
+
+
 def _dictionaries(variants: Sequence[Mapping[str, Parameter]]) -> list[Mapping[str, Parameter]]:
     """Returns the variants as a list; raises `TypeError` for anything but dictionaries."""
     if isinstance(variants, Mapping):
@@ -236,7 +248,7 @@ def _dictionaries(variants: Sequence[Mapping[str, Parameter]]) -> list[Mapping[s
     return rows
 
 
-def _planned(machine: Machine, psec: Setpoints) -> NDArray[np.float64] | _native.Scenario | _native.PartProgram:
+def planned(machine: Machine, psec: Setpoints) -> NDArray[np.float64] | _native.Scenario | _native.PartProgram:
     """Returns setpoints; those of a part program planned once, so that workers need no file."""
     given = machine.setpoints(psec)
     if isinstance(given, _native.PartProgram):
