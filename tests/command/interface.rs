@@ -45,7 +45,7 @@ fn the_text_of_the_interface_has_every_name_of_the_json() {
 #[test]
 fn rejection_codes_are_numbered_from_one_without_gap() {
     let numbers: Vec<u8> = RejectionCode::ALL.iter().map(|&code| code as u8).collect();
-    assert_eq!(numbers, (1..=17).collect::<Vec<u8>>());
+    assert_eq!(numbers, (1..=18).collect::<Vec<u8>>());
 }
 
 #[test]

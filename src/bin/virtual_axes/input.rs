@@ -98,6 +98,9 @@ impl CommandInput {
         for (line, note) in self.track.borrow().notes() {
             print_error(&format!("note: {}:{line}: {note}", self.name));
         }
+        if self.is_part_program() && self.track.borrow().cycle_time == 0.0 {
+            print_error(&format!("note: {}: the program has no motion", self.name));
+        }
     }
 
     /// Keeps the rows of a CSV file for [`take_rows`](Self::take_rows).
