@@ -167,6 +167,15 @@ def test_an_option_out_of_range_is_named(options: dict, text: str) -> None:
         ContouringEnv(**options).reset()
 
 
+def test_a_step_without_a_reset_or_with_a_wrong_action_is_named(machine: va.Machine) -> None:
+    env = ContouringEnv(machine=machine)
+    with pytest.raises(gymnasium.error.ResetNeeded, match="call reset first"):
+        env.step(np.zeros(2))
+    env.reset(seed=1)
+    with pytest.raises(gymnasium.error.InvalidAction, match=r"shape \(1, 3\); it needs \(1, 2\)"):
+        env.step(np.zeros(3))
+
+
 def test_the_programs_of_the_documentation_run() -> None:
     page = (Path(__file__).resolve().parent.parent / "docs/how-to/learning.md").read_text(encoding="utf-8")
     programs = re.findall(r"^```python\n(.*?)^```", page, re.DOTALL | re.MULTILINE)

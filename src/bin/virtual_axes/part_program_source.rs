@@ -12,6 +12,11 @@ use virtual_axes_nc::interpret::{IgnoredCode, Interpreter, InterpreterOptions, P
 use virtual_axes_nc::motion::{Blend, PathControl, ProgramEvent, ProgramStep};
 use virtual_axes_nc::plan::{FeedPlanError, PartProgramPlanner, PlanOptions};
 
+/// Hour, s.
+const HOUR: f64 = 3600.0;
+/// Longest cycle time, s: that of a loop without an end.
+const LONGEST: f64 = 100.0 * HOUR;
+
 /// Feed override over time: percent from a time on, s.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct OverrideSchedule(Vec<(f64, f64)>);
@@ -186,6 +191,12 @@ impl GridSource for PartProgramSource<'_> {
 
     fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError> {
         let time = seconds(self.cycle * self.period);
+        if time > LONGEST {
+            let (name, hours, line) = (self.name, LONGEST / HOUR, self.track.borrow().lines_read);
+            return Err(
+                format!("{name}:{line}: the program takes longer than {hours} h; end its loop").into()
+            );
+        }
         let setpoint = self.planner.next_setpoint(self.schedule.at(time)).map_err(|error| match error {
             // The interpreter's error names the file.
             FeedPlanError::Step(error) => error,

@@ -102,6 +102,8 @@ class _Fleet:
             if not isinstance(motion, str):
                 raise ValueError("feed: needs the name or path of a scenario as motion")
             name, (low, high) = motion, feed
+            if not 0 < low <= high < np.inf:
+                raise ValueError(f"feed {feed}: must be two positive numbers, the lower one first")
             return lambda random: _native.Scenario.load(name, float(random.uniform(low, high))).psec(self.machine)
         if callable(motion):
             return motion
@@ -134,6 +136,11 @@ class _Fleet:
 
     def step(self, actions: NDArray[np.float32]) -> tuple[Array, NDArray[np.bool_]]:
         """Advances by one position cycle; returns contour errors, m, and true for each motion that has ended."""
+        if not self._psec.shape[1]:
+            raise gymnasium.error.ResetNeeded("the environment has no motion yet; call reset first")
+        shape = (self._shape[0], len(self._columns))
+        if np.shape(actions) != shape:
+            raise gymnasium.error.InvalidAction(f"the action has the shape {np.shape(actions)}; it needs {shape}")
         psec = self._psec[self._rows[:, 0], self.cycle]
         offsets = np.zeros(self._shape)
         offsets[:, self._columns] = self._residual * actions
