@@ -196,8 +196,14 @@ impl<'a, V: Variables> Scanner<'a, V> {
         }
         let name = FUNCTIONS.into_iter().find(|name| self.skip(name));
         let name = name.ok_or_else(|| {
-            let known = FUNCTIONS.map(str::to_uppercase).join(" ");
-            format!("{}: not a function; supported: ATAN EXISTS {known}", self.rest())
+            let rest = self.rest();
+            let argument = rest.trim_start_matches(|letter: char| letter.is_ascii_alphabetic());
+            if argument.starts_with('[') {
+                let known = FUNCTIONS.map(str::to_uppercase).join(" ");
+                return format!("{rest}: not a function; supported: ATAN EXISTS {known}");
+            }
+            let hint = if rest.starts_with('O') { "; is the letter O meant as zero?" } else { "" };
+            format!("{rest}: not a number{hint}")
         })?;
         call(name, self.bracket()?)
     }

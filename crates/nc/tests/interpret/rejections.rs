@@ -134,6 +134,8 @@ fn invalid_expressions_are_rejected() {
         ("X[1[1]]", "word X: [1]]: an operator or closing bracket is required"),
         ("X[1+]", "word X: ]: a number, parameter or expression is required"),
         ("X[1", "word X: expression without closing bracket"),
+        ("GO1 X1", "word G: O1X1: not a number; is the letter O meant as zero?"),
+        ("THIS IS TEXT", "word T: HISISTEXT: not a number"),
         ("X FOO[1]", "word X: FOO[1]: not a function; supported: ATAN EXISTS ABS ACOS"),
         ("X ATAN[1]", "word X: ATAN: a second value is required, ATAN[y]/[x]"),
         ("X EXISTS[1]", "word X: EXISTS: a named parameter in brackets is required"),
