@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -43,6 +44,17 @@ class Manager(AxesClient):
         request = ChangeState.Request(transition=Transition(id=number, label=label))
         return self.call(ChangeState, "change_state", request, timeout=timeout).success
 
+    def clean_up(self) -> None:
+        """Requests the transition cleanup and waits for the participant that serves from then on."""
+        assert isinstance(self.process, Node)
+        text = "waiting for the transition configure"
+        count = self.process.output().count(text)
+        assert self.change("cleanup")
+        self.wait_for(lambda: self.process.output().count(text) > count, 20, "the restart")
+        # The previous participant is forgotten, and the new one is discovered.
+        time.sleep(1.0)
+        assert self.state() == State.PRIMARY_STATE_UNCONFIGURED
+
     def available(self, service: str = "get_available_transitions") -> list[tuple[int, str, str, str]]:
         """Returns number, label, start and goal of transitions."""
         rows = self.call(GetAvailableTransitions, service, GetAvailableTransitions.Request()).available_transitions
@@ -76,7 +88,7 @@ def manager(process: Node) -> Iterator[Manager]:
         if manager.state() == State.PRIMARY_STATE_ACTIVE:
             assert manager.change("deactivate")
         if manager.state() == State.PRIMARY_STATE_INACTIVE:
-            assert manager.change("cleanup")
+            manager.clean_up()
 
 
 @contextlib.contextmanager
@@ -175,8 +187,8 @@ def test_every_parameter_can_be_set_before_configuration(process: Node, manager:
         assert drive.get_parameters([GAIN, PREFIX]) == {GAIN: 7.5, PREFIX: "mill_"}
         with pytest.raises(ParameterRejected, match="while the node runs"):
             manager.set_parameters({PREFIX: ""})
-    assert manager.change("deactivate") and manager.change("cleanup")
-    manager.wait_for(lambda: manager.state() == State.PRIMARY_STATE_UNCONFIGURED, 20, "the state unconfigured")
+    assert manager.change("deactivate")
+    manager.clean_up()
     assert manager.get_parameters([GAIN, PREFIX]) == start
 
 

@@ -8,7 +8,7 @@ use futures::future::BoxFuture;
 use futures::stream::{FuturesUnordered, select_all};
 use ros2_client::service::RmwRequestId;
 use ros2_client::{Node, Publisher};
-use ros2_interfaces_jazzy_serde::lifecycle_msgs::msg::{TransitionDescription, TransitionEvent};
+use ros2_interfaces_jazzy_serde::lifecycle_msgs::msg::{Transition, TransitionDescription, TransitionEvent};
 use ros2_interfaces_jazzy_serde::lifecycle_msgs::srv::{
     ChangeStateRequest, ChangeStateResponse, GetAvailableStatesRequest, GetAvailableStatesResponse,
     GetAvailableTransitionsRequest, GetAvailableTransitionsResponse, GetStateRequest, GetStateResponse,
@@ -109,6 +109,12 @@ impl LifecycleServer {
                         state = after;
                     }
                     let response = self.change.respond(id, ChangeStateResponse { success: is_successful }, permit);
+                    if is_successful && description.transition.id == Transition::TRANSITION_CLEANUP {
+                        // Another participant serves the next requests.
+                        response.await;
+                        let _ = answered.send(());
+                        return;
+                    }
                     responses.push(Box::pin(async {
                         response.await;
                         // The receiver is dropped without a waiting task.

@@ -6,7 +6,7 @@ use std::time::Duration;
 use futures::future::Either;
 use ros2_client::Node;
 use tokio::sync::{mpsc, oneshot};
-use tokio::task::JoinSet;
+use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::timeout;
 use tracing::{error, info, warn};
 
@@ -105,11 +105,13 @@ impl ManagedNode {
         }
     }
 
-    /// Executes transitions until a signal or a cleanup. `stop` returns a controlled stop and its identifier.
+    /// Executes transitions until a signal or a cleanup. `stop` returns a controlled stop and its identifier;
+    /// `parameters` is the task that serves the parameters, which ends at a cleanup.
     pub(super) async fn run(
         &mut self,
         commands: &mpsc::Sender<Command>,
         stop: impl Fn() -> (MotionId, Option<Arc<Trajectory>>),
+        parameters: Option<&AbortHandle>,
         signals: &mut ShutdownSignals,
     ) -> OperationEnd {
         loop {
@@ -136,7 +138,8 @@ impl ManagedNode {
                     _ = done.send(is_stopped);
                 }
                 RequestedTransition::Cleanup => {
-                    info!("unconfigured");
+                    // This participant does not answer with values of the past.
+                    parameters.inspect(|task| task.abort());
                     _ = done.send(true);
                     let _ = timeout(RESPONSE_TIMEOUT, answered).await;
                     return OperationEnd::Cleanup;

@@ -178,6 +178,7 @@ async fn serve(
         ids: Arc::new(AtomicU64::new(1)),
         live: Arc::new(LiveNodeParameters::default()),
         tasks,
+        parameters: None,
     };
     tasks.spawn_log_output(rosout, log);
     let recording = recorder.start()?;
@@ -210,7 +211,7 @@ async fn serve(
         Some((managed, done)) => {
             // The receiver is dropped only with its server.
             _ = done.take().map(|done| done.send(true));
-            managed.run(&tasks.commands, tasks.stop(), signals).await
+            managed.run(&tasks.commands, tasks.stop(), tasks.parameters.as_ref(), signals).await
         }
     };
     let NodeTasks { commands, tasks, .. } = tasks;

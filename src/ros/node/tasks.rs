@@ -15,7 +15,7 @@ use ros2_interfaces_jazzy_serde::sensor_msgs::msg::JointState;
 use ros2_interfaces_jazzy_serde::trajectory_msgs::msg::JointTrajectory;
 use tokio::runtime::Handle;
 use tokio::sync::{Mutex, mpsc, watch};
-use tokio::task::JoinSet;
+use tokio::task::{AbortHandle, JoinSet};
 
 use super::endpoints::NodeServices;
 use super::outputs::{ActionOutputs, ProgramOutputs};
@@ -64,6 +64,8 @@ pub(super) struct NodeTasks<'a> {
     pub(super) ids: Arc<AtomicU64>,
     pub(super) live: Arc<LiveNodeParameters>,
     pub(super) tasks: JoinSet<()>,
+    /// Handle of the task that serves the parameters.
+    pub(super) parameters: Option<AbortHandle>,
 }
 
 impl NodeTasks<'_> {
@@ -197,7 +199,8 @@ impl NodeTasks<'_> {
         let now = move || convert::stamp(health.borrow().time);
         let mut host = NodeParameterHost::new(parameters, self.commands.clone(), Arc::clone(&self.live));
         let parameters = services.parameters;
-        self.tasks.spawn(async move { parameters.serve(&mut host, now, pending()).await });
+        let served = self.tasks.spawn(async move { parameters.serve(&mut host, now, pending()).await });
+        self.parameters = Some(served);
         let (commands, stop) = (self.commands.clone(), self.stop());
         let act = move || {
             let (id, stop) = stop();

@@ -78,13 +78,13 @@ def optimize(
     unknown = [key for key in limits if key.startswith("margin.") and key[7:] not in MARGINS]
     if unknown:
         raise ValueError(f"constraint {unknown[0]}: margins are {', '.join(MARGINS)}")
+    study = _open(storage, name, seed)
     known = machine.parameters
     missing = [key for key in parameters if key not in known]
     if missing:
         raise ValueError(f"parameter {missing[0]} is unknown")
     start = {key: known[key] for key in parameters}
     distributions = {key: _distribution(key, bounds, start[key]) for key, bounds in parameters.items()}
-    study = _open(storage, name, seed)
     if storage is not None:
         inputs = setup_identity(Setup(machine, planned(machine, motion), figures, 1))
         inputs["parameters"] = repr(sorted((key, tuple(bounds)) for key, bounds in parameters.items()))
