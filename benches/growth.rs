@@ -138,30 +138,48 @@ fn length(config: &MachineConfig) {
     }
 }
 
-/// Measures one machine with increasing numbers of axes, with their figures.
-fn axes(config: &MachineConfig) {
+/// Returns the row of a machine with a number of axes, those of `config` in turns, with their figures.
+fn axes_row(name: impl ToString, config: &MachineConfig, count: usize) -> Row<'static> {
     let cycle = cycle();
     let instants = (AXES_TIME / seconds(config.periods().position)) as usize;
-    let row = |count: usize| {
-        let indices: Vec<usize> = (0..count).map(|axis| axis % AXES).collect();
-        let parameters = MachineParameters::from_axes(config, &indices).expect("can be discretized");
-        let mut machine = Machine::new(Arc::new(parameters));
-        let cycle = Arc::clone(&cycle);
-        let mut psec = vec![0.0; count];
-        Row::new(count, AXES_TIME, move || {
-            let mut assessors = vec![AxisAssessor::default(); count];
-            machine.reset(&vec![0.0; count]);
-            for row in cycle.iter().cycle().take(instants) {
-                psec.iter_mut().zip(&indices).for_each(|(psec, &index)| *psec = row[index]);
-                machine.advance(&psec, &[]);
-                for (axis, assessor) in assessors.iter_mut().enumerate() {
-                    assessor.observe(machine.axis(axis).sample(), &machine.activity(axis));
-                }
+    let indices: Vec<usize> = (0..count).map(|axis| axis % AXES).collect();
+    let parameters = MachineParameters::from_axes(config, &indices).expect("can be discretized");
+    let mut machine = Machine::new(Arc::new(parameters));
+    let mut psec = vec![0.0; count];
+    Row::new(name, AXES_TIME, move || {
+        let mut assessors = vec![AxisAssessor::default(); count];
+        machine.reset(&vec![0.0; count]);
+        for row in cycle.iter().cycle().take(instants) {
+            psec.iter_mut().zip(&indices).for_each(|(psec, &index)| *psec = row[index]);
+            machine.advance(&psec, &[]);
+            for (axis, assessor) in assessors.iter_mut().enumerate() {
+                assessor.observe(machine.axis(axis).sample(), &machine.activity(axis));
             }
-            black_box(assessors);
-        })
-    };
+        }
+        black_box(assessors);
+    })
+}
+
+/// Measures one machine with increasing numbers of axes.
+fn axes(config: &MachineConfig) {
+    let row = |count: usize| axes_row(count, config, count);
     table("axes: one machine, figures of the axes", "axes", [1, 2, 4, 5, 8, 16, 32].map(row).into());
+}
+
+/// Measures the default machine with rigid and with elastic transmissions on all axes.
+fn transmissions(rigid: &MachineConfig) {
+    let linear = ["x", "y", "z"].into_iter().flat_map(|axis| {
+        [("stiffness_n_um", 200.0), ("damping_n_s_m", 15_000.0), ("load_mass_kg", 300.0)]
+            .map(|(name, value)| (format!("{axis}.transmission.{name}"), value))
+    });
+    let rotary = ["a", "c"].into_iter().flat_map(|axis| {
+        [("stiffness_nm_rad", 2e6), ("damping_nm_s_rad", 500.0), ("load_inertia_kg_m2", 2.0)]
+            .map(|(name, value)| (format!("{axis}.transmission.{name}"), value))
+    });
+    let changes: Vec<(String, f64)> = linear.chain(rotary).collect();
+    let elastic = parameters(&changes).machine_config().expect("a machine");
+    let rows = vec![axes_row("rigid", rigid, AXES), axes_row("elastic", &elastic, AXES)];
+    table("transmissions: one machine of five axes, figures of the axes", "axes", rows);
 }
 
 /// Creates machines with different gains.
@@ -219,7 +237,7 @@ fn machines(config: &MachineConfig, counts: &[usize], cores: &[usize]) {
 }
 
 /// Names of the tables.
-const TABLES: [&str; 4] = ["length", "axes", "machines", "cores"];
+const TABLES: [&str; 5] = ["length", "axes", "transmissions", "machines", "cores"];
 
 fn main() {
     // `cargo bench` passes --bench.
@@ -235,6 +253,9 @@ fn main() {
     }
     if is_wanted("axes") {
         axes(&config);
+    }
+    if is_wanted("transmissions") {
+        transmissions(&config);
     }
     if is_wanted("machines") {
         machines(&config, &[1, 8, 32, 64, 256, 1024], &[1]);

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes tests/golden/drives.csv and loops.csv: drives at the limits of their ranges, computed with 120 digits.
+"""Writes drives.csv and loops.csv of crates/core/tests/golden: drives at the limits of their ranges, with 120 digits.
 
     pip install mpmath==1.4.1
     python tools/golden_drives.py
@@ -19,7 +19,7 @@ import options
 
 # Digits: the largest exponent has 14, the smallest significant entries need 60.
 mpmath.mp.dps = 120
-GOLDEN = pathlib.Path(__file__).parent.parent / "tests" / "golden"
+GOLDEN = pathlib.Path(__file__).parent.parent / "crates/core/tests/golden"
 SEED = 8
 
 # SI, minimum and maximum of the schema, deviations of the plant included; one value between them.

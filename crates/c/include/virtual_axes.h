@@ -117,6 +117,10 @@ typedef struct VaSignals {
    */
   double delay_compensated_following_error;
   /**
+   * Wind-up of an elastic transmission, position of the motor at the axis minus `position`, m or rad.
+   */
+  double wind_up;
+  /**
    * True if a setpoint is at its limit.
    */
   bool is_saturated;

@@ -42,6 +42,8 @@ pub struct VaSignals {
     pub following_error: f64,
     /// Following error with the delayed setpoint, m or rad.
     pub delay_compensated_following_error: f64,
+    /// Wind-up of an elastic transmission, position of the motor at the axis minus `position`, m or rad.
+    pub wind_up: f64,
     /// True if a setpoint is at its limit.
     pub is_saturated: bool,
     /// True if the friction law is extrapolated beyond its fitted range.
@@ -150,6 +152,7 @@ pub unsafe extern "C" fn va_signals(
             effort: sample.effort,
             following_error: sample.following_error(),
             delay_compensated_following_error: sample.delay_compensated_following_error(),
+            wind_up: sample.wind_up,
             is_saturated: sample.saturated,
             is_friction_extrapolated: sample.friction_extrapolated,
         };

@@ -24,6 +24,8 @@ pub const REVOLUTION: f64 = TAU;
 pub const DEGREE: f64 = PI / 180.0;
 /// Radians in a millidegree.
 pub const MILLIDEGREE: f64 = 1e-3 * DEGREE;
+/// Newtons per meter in a newton per micrometer.
+pub const NEWTON_PER_MICROMETER: f64 = 1e6;
 /// Meters per second in a meter per minute.
 pub const METER_PER_MINUTE: f64 = 1.0 / MINUTE;
 /// Position-loop gain of one (m/min)/mm or one (1000 °/min)/°, s⁻¹: both are 1000/60 s⁻¹.

@@ -95,6 +95,12 @@ pub const SIGNALS: &[FmuSignal] = &[
         |s| s.load_current,
         "External load as motor current, positive against motion towards plus.",
     ),
+    real(
+        "wind_up",
+        SignalQuantity::Position,
+        |s| s.wind_up,
+        "Wind-up of an elastic transmission: position of the motor at the axis minus position of the load.",
+    ),
     boolean("is_saturated", |s| s.saturated, "True if speed, current or voltage setpoint is at its limit."),
     boolean(
         "is_friction_extrapolated",

@@ -31,6 +31,8 @@ pub(crate) fn base_unit(name: &str) -> Option<&'static str> {
         "V·s/rad" => r#"kg="1" m="2" s="-2" A="-1" rad="-1""#,
         "N/(m/s)" => r#"kg="1" s="-1""#,
         "N·m/(rad/s)" => r#"kg="1" m="2" s="-1" rad="-1""#,
+        "N/µm" => r#"kg="1" s="-2" factor="1e6""#,
+        "N·m/rad" => r#"kg="1" m="2" s="-2" rad="-1""#,
         "kg" => r#"kg="1""#,
         "kg·m²" => r#"kg="1" m="2""#,
         _ => return None,

@@ -7,7 +7,7 @@ use virtual_axes_core::machine::{AxisSample, Machine};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
 /// Signals of an axis, in the order of the columns of [`SignalTable`].
-pub const NAMES: [&str; 14] = [
+pub const NAMES: [&str; 15] = [
     "psec",
     "delayed_psec",
     "position",
@@ -22,6 +22,7 @@ pub const NAMES: [&str; 14] = [
     "gravity_current",
     "load_current",
     "effort",
+    "wind_up",
 ];
 
 fn values(sample: &AxisSample) -> [f64; NAMES.len()] {
@@ -40,6 +41,7 @@ fn values(sample: &AxisSample) -> [f64; NAMES.len()] {
         sample.gravity_current,
         sample.load_current,
         sample.effort,
+        sample.wind_up,
     ]
 }
 

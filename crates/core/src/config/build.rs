@@ -9,13 +9,13 @@ use super::layout::JointVariant;
 use super::machine::{
     AxisConfig, AxisKind, DelaysConfig, DeviationConfig, FeedforwardConfig, FrictionConfig, GpcConfig,
     GravityConfig, KinematicsConfig, LimitsConfig, MachineConfig, MotorConfig, Periods, PiConfig,
-    PositionControllerConfig, PositionLoopConfig, RstConfig,
+    PositionControllerConfig, PositionFeedback, PositionLoopConfig, RstConfig, TransmissionConfig,
 };
 use super::parameters::Parameters;
 use super::value::Value;
 use crate::units::{
     DEGREE, METER_PER_MINUTE, MICROSECOND_NS, MILLIHENRY, MILLIMETER, MILLISECOND, MILLISECOND_NS,
-    POSITION_GAIN, REVOLUTION, RPM,
+    NEWTON_PER_MICROMETER, POSITION_GAIN, REVOLUTION, RPM,
 };
 
 impl Parameters {
@@ -80,6 +80,20 @@ impl Parameters {
     }
 }
 
+/// Returns the keys of stiffness, damping and load inertia of an elastic transmission, without the name of the axis.
+pub(super) fn transmission_suffixes(axis: AxisKind) -> [&'static str; 3] {
+    match axis {
+        AxisKind::Linear => {
+            ["transmission.stiffness_n_um", "transmission.damping_n_s_m", "transmission.load_mass_kg"]
+        }
+        AxisKind::Rotary => [
+            "transmission.stiffness_nm_rad",
+            "transmission.damping_nm_s_rad",
+            "transmission.load_inertia_kg_m2",
+        ],
+    }
+}
+
 /// Parameters of one axis.
 struct AxisParameters<'a> {
     set: &'a Parameters,
@@ -117,6 +131,7 @@ impl AxisParameters<'_> {
             name: self.joint.name.clone(),
             kind: self.joint.axis,
             transmission_ratio: self.transmission_ratio()?,
+            transmission: self.transmission()?,
             motor: self.motor()?,
             friction: FrictionConfig {
                 a: self.number("friction.a")?,
@@ -133,6 +148,10 @@ impl AxisParameters<'_> {
             position_loop: PositionLoopConfig {
                 gain: self.scaled("position_loop.gain", POSITION_GAIN)?,
                 controller: self.position_controller()?,
+                feedback: match self.set.text(&self.key("position_loop.feedback")).as_str() {
+                    "load" => PositionFeedback::Load,
+                    _ => PositionFeedback::Motor,
+                },
                 allow_unstable: self.set.flag(&self.key("position_loop.allow_unstable")),
             },
             velocity_loop: pi("velocity_loop")?,
@@ -210,6 +229,23 @@ impl AxisParameters<'_> {
             AxisKind::Linear => self.scaled("transmission.screw_lead_mm", MILLIMETER)? / TAU,
             AxisKind::Rotary => 1.0 / self.number("transmission.gear_ratio")?,
         })
+    }
+
+    /// Returns the elastic transmission in units of the motor; `None` without a stiffness.
+    fn transmission(&self) -> Result<Option<TransmissionConfig>, ConfigError> {
+        let [stiffness, damping, load_inertia] = transmission_suffixes(self.joint.axis);
+        let (Ok(stiffness), ratio) = (self.number(stiffness), self.transmission_ratio()?) else {
+            return Ok(None);
+        };
+        let unit = match self.joint.axis {
+            AxisKind::Linear => NEWTON_PER_MICROMETER,
+            AxisKind::Rotary => 1.0,
+        };
+        Ok(Some(TransmissionConfig {
+            stiffness: stiffness * unit * ratio * ratio,
+            damping: self.or_zero(damping) * ratio * ratio,
+            load_inertia: self.number(load_inertia)? * ratio * ratio,
+        }))
     }
 
     fn motor(&self) -> Result<MotorConfig, ConfigError> {

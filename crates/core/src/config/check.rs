@@ -1,14 +1,16 @@
 //! Validation of a parameter set: each value against the schema, then values against each other.
 
 use std::collections::{BTreeMap, HashSet};
+use std::f64::consts::TAU;
 
+use super::build::transmission_suffixes;
 use super::definition::{MotorKind, Presence};
 use super::error::{ConfigError, ValueSource};
 use super::layout::{JointVariant, ParameterLayout, joint_name_violation, plain_definition};
 use super::machine::AxisKind;
 use super::value::{Value, number_text};
 use crate::text::shortened;
-use crate::units::{MICROSECOND_NS, MILLISECOND_NS, Nanoseconds, Rounded, SECOND_NS};
+use crate::units::{MICROSECOND_NS, MILLIMETER, MILLISECOND_NS, Nanoseconds, Rounded, SECOND_NS};
 
 /// Relative tolerance of `publish_rate` above the rate of position cycles: 166.7 Hz is accepted for 6 ms.
 const RATE_TOLERANCE: f64 = 1e-2;
@@ -56,6 +58,7 @@ pub(super) fn check(
     set.check_clock()?;
     for joint in &layout.joints {
         set.check_transmission(joint, origin)?;
+        set.check_elasticity(joint, origin)?;
         set.check_friction(joint)?;
         set.check_travel_limits(joint)?;
         set.check_horizons(joint)?;
@@ -270,6 +273,47 @@ impl CrossChecks<'_> {
             )),
             _ => Ok(()),
         }
+    }
+
+    /// Checks that stiffness and load are given together, and that the motor has an inertia of its own.
+    fn check_elasticity(&self, joint: &JointVariant, origin: &ValueSource) -> Result<(), ConfigError> {
+        let key = |suffix: &str| format!("{}.{suffix}", joint.name);
+        let [stiffness, damping, load] = transmission_suffixes(joint.axis).map(key);
+        let has = |key: &String| self.entries.contains_key(key);
+        let Some(load_inertia) = self.number(&load).filter(|_| has(&stiffness)) else {
+            return match (has(&stiffness), has(&load)) {
+                (true, false) => Err(missing(origin, &load, format!("expected it beside {stiffness}"))),
+                (false, true) => Err(missing(origin, &stiffness, format!("expected it beside {load}"))),
+                _ if self.number(&damping).is_some_and(|value| value > 0.0) => {
+                    Err(missing(origin, &stiffness, format!("expected it beside {damping}")))
+                }
+                _ => Ok(()),
+            };
+        };
+        let inertia_key = key(match joint.motor {
+            MotorKind::Rotary => "motor.inertia_kg_m2",
+            MotorKind::Linear => "motor.mass_kg",
+        });
+        let per_axis = match joint.axis {
+            _ if self.value(&key(DIRECT)) == Some(Value::Bool(true)) => Some(1.0),
+            AxisKind::Linear => {
+                self.number(&key("transmission.screw_lead_mm")).map(|lead| lead * MILLIMETER / TAU)
+            }
+            AxisKind::Rotary => self.number(&key("transmission.gear_ratio")).map(|ratio| 1.0 / ratio),
+        };
+        let (Some(inertia), Some(ratio)) = (self.number(&inertia_key), per_axis) else { return Ok(()) };
+        let most = inertia / (ratio * ratio);
+        if load_inertia < most {
+            return Ok(());
+        }
+        Err(self.rejection(
+            &[&load, &inertia_key],
+            format!(
+                "be below {}, which is {inertia_key} at the axis, found {load} = {}",
+                Rounded(most),
+                number_text(load_inertia)
+            ),
+        ))
     }
 
     fn check_friction(&self, joint: &JointVariant) -> Result<(), ConfigError> {

@@ -71,6 +71,8 @@ pub struct AxisConfig {
     pub kind: AxisKind,
     /// Transmission ratio r: axis travel (m or rad) per motor travel (rad or m).
     pub transmission_ratio: f64,
+    /// Elastic transmission; `None` for a rigid axis.
+    pub transmission: Option<TransmissionConfig>,
     /// Motor parameters.
     pub motor: MotorConfig,
     /// Friction law.
@@ -91,6 +93,17 @@ pub struct AxisConfig {
     pub deviation: DeviationConfig,
     /// Trajectory limits.
     pub limits: LimitsConfig,
+}
+
+/// Elastic transmission between motor and load, in units of the motor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TransmissionConfig {
+    /// Stiffness, N·m/rad (N/m for a linear motor).
+    pub stiffness: f64,
+    /// Damping, N·m·s/rad (N·s/m for a linear motor).
+    pub damping: f64,
+    /// Inertia of the load, kg·m² (kg for a linear motor); a part of [`MotorConfig::inertia`].
+    pub load_inertia: f64,
 }
 
 /// Equivalent DC motor of the servo motor (Prévost eq. 1).
@@ -147,8 +160,20 @@ pub struct PositionLoopConfig {
     pub gain: f64,
     /// Position controller.
     pub controller: PositionControllerConfig,
+    /// Encoder of the position controller.
+    pub feedback: PositionFeedback,
     /// True if an unstable closed loop is accepted.
     pub allow_unstable: bool,
+}
+
+/// Encoder that a position controller reads. The velocity controller reads the motor.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum PositionFeedback {
+    /// Encoder of the motor (semi-closed loop).
+    #[default]
+    Motor,
+    /// Scale at the load (closed loop).
+    Load,
 }
 
 /// Type and parameters of a position controller.

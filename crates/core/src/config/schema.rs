@@ -151,6 +151,31 @@ const MACHINE: &[ParameterDefinition] = &[
         .of_axis()
         .optional()
         .describe("Direct drive: a torque motor on a rotary axis, a linear motor on a linear axis."),
+    // Elastic transmission.
+    ParameterDefinition::number("transmission.stiffness_n_um", "N/µm", 1e-3, 1e6)
+        .on(Linear)
+        .optional()
+        .describe("Stiffness between motor and load along the axis; rigid if omitted."),
+    ParameterDefinition::number("transmission.stiffness_nm_rad", "N·m/rad", 1e-3, 1e12)
+        .on(Rotary)
+        .optional()
+        .describe("Torsional stiffness between motor and load at the axis; rigid if omitted."),
+    ParameterDefinition::number("transmission.damping_n_s_m", "N/(m/s)", 0.0, 1e9)
+        .on(Linear)
+        .default(Number(0.0))
+        .describe("Damping between motor and load along the axis; needs a stiffness."),
+    ParameterDefinition::number("transmission.damping_nm_s_rad", "N·m/(rad/s)", 0.0, 1e9)
+        .on(Rotary)
+        .default(Number(0.0))
+        .describe("Torsional damping between motor and load at the axis; needs a stiffness."),
+    ParameterDefinition::number("transmission.load_mass_kg", "kg", 1e-6, 1e6)
+        .on(Linear)
+        .optional()
+        .describe("Mass of the load behind the stiffness; at the motor it is a part of the inertia Jeq."),
+    ParameterDefinition::number("transmission.load_inertia_kg_m2", "kg·m²", 1e-9, 1e6)
+        .on(Rotary)
+        .optional()
+        .describe("Inertia of the load about the axis behind the stiffness; at the motor it is a part of the inertia Jeq."),
     // Motor.
     ParameterDefinition::number("motor.inertia_kg_m2", "kg·m²", POSITIVE, 1e3)
         .driven_by(RotaryMotor)
@@ -248,6 +273,10 @@ const MACHINE: &[ParameterDefinition] = &[
         .optional()
         .live()
         .describe("λ, weight of the control increments (Prévost table 1)."),
+    ParameterDefinition::new("position_loop.feedback", "", ParameterKind::Choice(&["motor", "load"]))
+        .of_axis()
+        .default(Text("motor"))
+        .describe("Encoder of the position controller: at the motor (semi-closed loop), or at the load of an elastic transmission (closed loop)."),
     ParameterDefinition::new("position_loop.allow_unstable", "", ParameterKind::Flag)
         .of_axis()
         .default(Flag(false))

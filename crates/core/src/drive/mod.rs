@@ -15,6 +15,7 @@ mod gravity;
 mod motor;
 mod plant;
 mod response;
+mod transmission;
 
 pub use friction::Friction;
 pub(crate) use friction_expansion::FrictionExpansion;
@@ -22,6 +23,7 @@ pub use gravity::Gravity;
 pub(crate) use gravity::GravityExpansion;
 pub use motor::{Motor, MotorState};
 pub use plant::{Plant, Torques};
+pub use transmission::{LoadState, Transmission};
 
 use crate::units::Rounded;
 

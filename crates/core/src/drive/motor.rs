@@ -38,10 +38,12 @@ soa_struct! {
     /// Φ and Γ are blocks of the exponential of the augmented system matrix times the tick.
     #[derive(Debug, Clone, Copy, PartialEq)]
     pub struct Motor {
-        current: TransitionRow<N>,
-        speed: TransitionRow<N>,
-        angle: TransitionRow<N>,
-        /// Torque per change of ω over one tick, (N·m)/(rad/s).
+        pub(super) current: TransitionRow<N>,
+        pub(super) speed: TransitionRow<N>,
+        pub(super) angle: TransitionRow<N>,
+        /// Change of ω over one tick per torque at the motor, (rad/s)/(N·m).
+        speed_per_torque: N,
+        /// Torque at the motor per change of ω over one tick, (N·m)/(rad/s).
         torque_per_speed: N,
         /// Change of i by a torque that changes ω by 1 rad/s over one tick, A/(rad/s).
         current_per_speed: N,
@@ -54,18 +56,24 @@ soa_struct! {
     /// One row of the discretized system: weights of i, ω, u and τ.
     #[derive(Debug, Clone, Copy, PartialEq)]
     pub(super) struct TransitionRow {
-        current: N,
-        speed: N,
-        voltage: N,
-        torque: N,
+        pub current: N,
+        pub speed: N,
+        pub voltage: N,
+        pub torque: N,
     }
 }
 
 impl<N: SimdReal> TransitionRow<N> {
     #[inline(always)]
     fn apply(&self, s: &MotorState<N>, voltage: N, torque: N) -> N {
+        self.apply_to(s, voltage, self.torque * torque)
+    }
+
+    /// Adds the weighted i, ω and u to `rest`.
+    #[inline(always)]
+    pub fn apply_to(&self, s: &MotorState<N>, voltage: N, rest: N) -> N {
         // The voltage is the last operand to be computed.
-        let rest = self.current.mul_add(s.current, self.speed.mul_add(s.speed, self.torque * torque));
+        let rest = self.current.mul_add(s.current, self.speed.mul_add(s.speed, rest));
         self.voltage.mul_add(voltage, rest)
     }
 }
@@ -141,19 +149,27 @@ impl Motor {
             let frequency_hz = (stiffness - damping * damping / 4.0).max(0.0).sqrt() / TAU;
             return Err(DriveError::Oscillates { period_s: period, frequency_hz });
         }
-        Ok(Motor {
+        Ok(Self::from_rows([current, speed, angle], [current, speed, angle].map(|row| row.torque)))
+    }
+
+    /// Creates the motor from its rows; `friction` contains the changes of i, ω and θ per torque at the motor, which
+    /// differ from the weights of τ if τ acts behind an elastic transmission.
+    pub(super) fn from_rows([current, speed, angle]: [TransitionRow; 3], friction: [f64; 3]) -> Self {
+        let torque_per_speed = 1.0 / friction[1];
+        Motor {
             current,
             speed,
             angle,
+            speed_per_torque: friction[1],
             torque_per_speed,
-            current_per_speed: current.torque * torque_per_speed,
-            angle_per_speed: angle.torque * torque_per_speed,
-        })
+            current_per_speed: friction[0] * torque_per_speed,
+            angle_per_speed: friction[2] * torque_per_speed,
+        }
     }
 
-    /// Returns the change of ω over one tick per torque, (rad/s)/(N·m).
+    /// Returns the change of ω over one tick per torque at the motor, (rad/s)/(N·m).
     pub(super) fn speed_per_torque(&self) -> f64 {
-        self.speed.torque
+        self.speed_per_torque
     }
 }
 
@@ -183,12 +199,17 @@ impl<N: SimdReal> Motor<N> {
     ) -> (MotorState<N>, N) {
         let free = self.step(s, voltage, external);
         let speed_drop = clamp_abs(free.speed, max_speed_drop);
-        let state = MotorState {
+        (self.brake(&free, speed_drop), speed_drop)
+    }
+
+    /// Returns the state `free` at the end of a tick with the speed drop by friction over it, rad/s.
+    #[inline(always)]
+    pub(super) fn brake(&self, free: &MotorState<N>, speed_drop: N) -> MotorState<N> {
+        MotorState {
             current: speed_drop.mul_add(-self.current_per_speed, free.current),
             speed: free.speed - speed_drop,
             angle: speed_drop.mul_add(-self.angle_per_speed, free.angle),
-        };
-        (state, speed_drop)
+        }
     }
 
     /// Returns the friction torque for a speed drop over one tick (rad/s), N·m.

@@ -1,7 +1,7 @@
 //! Plant of one axis: motor, friction, gravity and load.
 
-use super::{DriveError, Friction, Gravity, GravityExpansion, Motor, MotorState};
-use crate::config::{AxisConfig, MotorConfig};
+use super::{DriveError, Friction, Gravity, GravityExpansion, LoadState, Motor, MotorState, Transmission};
+use crate::config::{AxisConfig, MotorConfig, TransmissionConfig};
 use crate::simd::{SimdReal, soa_struct};
 
 /// Torques over one tick, N·m at the motor (N for a linear motor).
@@ -23,6 +23,7 @@ soa_struct! {
         /// Friction law scaled to the speed change per tick, rad/s.
         pub(crate) friction_speed_drop: Friction<N>,
         pub(crate) gravity: Gravity<N>,
+        pub(crate) transmission: Transmission<N>,
         transmission_ratio: N,
         /// Kt of the plant with its deviation, N·m/A.
         torque_constant: N,
@@ -39,11 +40,15 @@ impl Plant {
         let motor = Self::deviating_motor(axis);
         // The friction law is in amperes of the nominal motor: its torque does not change with the deviation of Kt.
         let friction_constant = axis.motor.torque_constant * deviation.friction;
-        let discretized = Motor::new(&motor, period)?;
+        let (discretized, transmission) = match Self::deviating_transmission(axis) {
+            Some(elastic) => Transmission::new(&motor, &elastic, period)?,
+            None => (Motor::new(&motor, period)?, Transmission::rigid()),
+        };
         let friction_speed_drop = friction_constant * discretized.speed_per_torque();
         Ok(Plant {
             friction_speed_drop: Friction::new(axis.friction, axis.kind, r, friction_speed_drop),
             gravity: Gravity::new(&axis.gravity, r),
+            transmission,
             transmission_ratio: r,
             torque_constant: motor.torque_constant,
             motor: discretized,
@@ -59,13 +64,46 @@ impl Plant {
         }
     }
 
+    /// Returns the elastic transmission of `axis` with the deviation of inertia.
+    pub fn deviating_transmission(axis: &AxisConfig) -> Option<TransmissionConfig> {
+        let deviating = |t: TransmissionConfig| TransmissionConfig {
+            load_inertia: t.load_inertia * axis.deviation.inertia,
+            ..t
+        };
+        axis.transmission.map(deviating)
+    }
+
     /// Returns true if the friction law is extrapolated at a motor speed ω (rad/s).
     #[inline]
     pub fn is_friction_extrapolated(&self, speed: f64) -> bool {
         self.friction_speed_drop.is_extrapolated(speed)
     }
 
-    /// Steps the plant by one tick under `voltage` (V) and an external `load` (N or N·m at the axis); returns the
+    /// Steps a plant with an elastic transmission by one tick, as [`step`](Self::step) a rigid one: friction acts at the
+    /// motor, gravity and `load` at the load.
+    pub fn step_with_load(
+        &self,
+        s: &mut MotorState,
+        load_state: &mut LoadState,
+        voltage: f64,
+        load: f64,
+    ) -> Torques {
+        let gravity = self.gravity_torque(s.angle - load_state.wind_up);
+        let load = self.load_torque(load);
+        let bound = self.friction_speed_drop.bound(s.speed);
+        let speed_drop = self.step_elastic(s, load_state, voltage, load - gravity, bound);
+        Torques { friction: self.torque_from_speed_drop(speed_drop), gravity, load }
+    }
+
+    /// Returns position, velocity (m, m/s or rad, rad/s) and current (A) of the axis: those of the load with an elastic
+    /// transmission.
+    #[inline]
+    pub fn motion(&self, motor: &MotorState, load: &LoadState) -> [f64; 3] {
+        let speed = if self.transmission.is_elastic() { load.speed } else { motor.speed };
+        [self.position(motor.angle - load.wind_up), self.velocity(speed), motor.current]
+    }
+
+    /// Steps a rigid plant by one tick under `voltage` (V) and an external `load` (N or N·m at the axis); returns the
     /// torques over the tick.
     ///
     /// Friction is the torque that gives standstill at the end of the tick, limited to its bound. It stops the axis
@@ -98,7 +136,7 @@ impl<N: SimdReal> Plant<N> {
         speed * self.transmission_ratio
     }
 
-    /// Returns the gravity torque at a motor angle θ (rad), N·m at the motor.
+    /// Returns the gravity torque at an angle θ of the load (rad), N·m at the motor.
     #[inline(always)]
     pub fn gravity_torque(&self, angle: N) -> N {
         self.gravity.torque(self.position(angle))
@@ -136,6 +174,20 @@ impl<N: SimdReal> Plant<N> {
         let (state, speed_drop) = self.motor.step_with_friction(s, voltage, external, max_speed_drop);
         *s = state;
         speed_drop
+    }
+
+    /// Steps motor and load by one tick with known torques, the load in place of the motor under `external`; see
+    /// [`step_with_torques`](Self::step_with_torques).
+    #[inline(always)]
+    pub(crate) fn step_elastic(
+        &self,
+        s: &mut MotorState<N>,
+        load: &mut LoadState<N>,
+        voltage: N,
+        external: N,
+        max_speed_drop: N,
+    ) -> N {
+        self.transmission.step_with_friction(&self.motor, s, load, [voltage, external, max_speed_drop])
     }
 
     /// Returns the friction torque for a speed drop over one tick (rad/s), N·m.

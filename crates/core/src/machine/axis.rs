@@ -2,12 +2,12 @@
 //!
 //! [`inner_loops`](super::inner_loops) runs the inner loops and the plant.
 
-use crate::config::{AxisConfig, Periods};
+use crate::config::{AxisConfig, Periods, PositionFeedback};
 use crate::control::{
     Delays, Feedforward, Pi, PiState, PositionController, PositionState, SetpointHistory, SetpointWindow,
     TickDelay,
 };
-use crate::drive::{MotorState, Plant};
+use crate::drive::{LoadState, MotorState, Plant};
 use crate::state_codec::StateCodec;
 use crate::units::seconds;
 
@@ -25,6 +25,8 @@ pub struct AxisParameters {
     feedforward: Feedforward,
     pub(super) compensation: Option<FrictionCompensation>,
     delays: Delays,
+    /// Weight of the wind-up in the angle that the position controller reads: 1 with an encoder at the load, else 0.
+    wind_up_feedback: f64,
     position_delay: TickDelay,
     velocity_delay: TickDelay,
     torque_delay: TickDelay,
@@ -96,6 +98,7 @@ impl AxisParameters {
             velocity_delay: TickDelay::new(delays.velocity, ticks),
             torque_delay: TickDelay::new(delays.torque, ticks),
             delays,
+            wind_up_feedback: f64::from(u8::from(axis.position_loop.feedback == PositionFeedback::Load)),
             transmission_ratio: axis.transmission_ratio,
             inverse_ratio: 1.0 / axis.transmission_ratio,
             torque_constant: motor.torque_constant,
@@ -112,6 +115,9 @@ impl AxisParameters {
         ZeroOrderHold { before, after, step: delay.switch_tick().div_ceil(self.ticks_per_velocity) as f64 }
     }
 }
+
+/// State of motor and load; that of the load is 0 for a rigid axis.
+pub(super) type DriveState = (MotorState, LoadState);
 
 /// State of one axis outside the inner loops, and its last sample.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,17 +136,20 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Creates an axis at rest at `position` (m or rad), with the motor current that holds it against gravity.
+    /// Creates an axis at rest with the encoder of the position controller at `position` (m or rad), and with the motor
+    /// current that holds it against gravity. With an encoder at the motor, gravity displaces an elastic load.
     pub(super) fn at_rest(p: &AxisParameters, position: f64) -> (Self, InnerLoopState) {
         let angle = position / p.transmission_ratio;
         let plant = &p.loops.plant;
         let gravity = plant.gravity_torque(angle);
+        let wind_up = plant.transmission.wind_up_at_rest(gravity);
         let current = gravity / plant.torque_constant();
         // The drive assumes its own Kt.
         let torque = gravity * (p.torque_constant / plant.torque_constant());
         let voltage = p.resistance * current;
         let state = InnerLoopState {
-            motor: MotorState { current, speed: 0.0, angle },
+            motor: MotorState { current, speed: 0.0, angle: angle + p.wind_up_feedback * wind_up },
+            load: LoadState { wind_up, speed: 0.0 },
             velocity: PiState { integral: torque, excess: 0.0 },
             current: PiState { integral: voltage, excess: 0.0 },
             current_setpoint: current,
@@ -157,7 +166,7 @@ impl Axis {
             sample: AxisSample { psec: position, delayed_psec: position, ..AxisSample::default() },
         };
         let record = TickRecord { current_setpoint: current, voltage, gravity, ..TickRecord::default() };
-        axis.update_sample(p, 0, &state.motor, &record);
+        axis.update_sample(p, 0, &(state.motor, state.load), &record);
         (axis, state)
     }
 
@@ -240,7 +249,8 @@ impl Axis {
         let torque = hold(p.torque_delay, &|k| p.feedforward.torque(history, k));
         let feedforward = velocity.at(0.0);
         let setpoint = |j| history.at(k + j) * p.inverse_ratio;
-        let mut unlimited = p.position.update(&mut self.position, setpoint, motor.angle, feedforward);
+        let angle = motor.angle - p.wind_up_feedback * state.load.wind_up;
+        let mut unlimited = p.position.update(&mut self.position, setpoint, angle, feedforward);
         // Adding 0 would change the sign of -0.
         if self.velocity_offset != 0.0 {
             unlimited += self.velocity_offset;
@@ -282,24 +292,25 @@ impl Axis {
         &mut self,
         p: &AxisParameters,
         tick: usize,
-        motor: &MotorState,
+        state: &DriveState,
         record: &TickRecord,
     ) {
         let load = if tick == 0 { self.previous_load } else { self.inputs.load };
-        self.sample = self.sample_with(p, tick, motor, record, load);
+        self.sample = self.sample_with(p, tick, state, record, load);
     }
 
-    /// Returns the signals with the controller outputs of a tick; `load` is that over the tick before `motor`, N·m at the
-    /// motor.
+    /// Returns the signals with the controller outputs of a tick; `load` is that over the tick before the state, N·m at
+    /// the motor.
     fn sample_with(
         &self,
         p: &AxisParameters,
         tick: usize,
-        motor: &MotorState,
+        (motor, load_state): &DriveState,
         record: &TickRecord,
         load: f64,
     ) -> AxisSample {
         let plant = &p.loops.plant;
+        let [position, velocity, current] = plant.motion(motor, load_state);
         let torque_constant = plant.torque_constant();
         let velocity_cycle = tick / p.ticks_per_velocity as usize;
         let compensation = p
@@ -307,9 +318,10 @@ impl Axis {
             .as_ref()
             .map_or(0.0, |compensation| self.compensation_torque(compensation, p, velocity_cycle));
         AxisSample {
-            position: plant.position(motor.angle),
-            velocity: plant.velocity(motor.speed),
-            current: motor.current,
+            position,
+            wind_up: plant.position(load_state.wind_up),
+            velocity,
+            current,
             current_setpoint: record.current_setpoint,
             voltage: record.voltage,
             velocity_setpoint: self.inputs.velocity_setpoint,
@@ -335,7 +347,7 @@ impl Axis {
         record: &TickRecord,
     ) -> AxisSample {
         let record = TickRecord { friction: state.friction, gravity: state.gravity, ..*record };
-        self.sample_with(p, tick, &state.motor, &record, self.inputs.load)
+        self.sample_with(p, tick, &(state.motor, state.load), &record, self.inputs.load)
     }
 
     /// Returns the signals at the start of the last position cycle, or at the tick that

@@ -2,11 +2,12 @@
 
 use pulp::{Arch, Scalar, Simd, WithSimd};
 
+use super::axis::DriveState;
 use super::inner_loops::{
     Aligned, AxisBlock, CycleStatistics, CycleTicks, InnerLoopInputs, InnerLoopState, InnerLoops, TickRecord,
     TickSpan,
 };
-use crate::drive::MotorState;
+use crate::drive::LoadState;
 use crate::state_codec::StateCodec;
 
 /// Lanes of the small block, used for up to four axes if the widest vector of the processor has at most four lanes:
@@ -128,17 +129,27 @@ impl AxisBank {
         });
     }
 
-    /// Returns the motor state of an axis at the start of a tick of the last position cycle.
+    /// Returns the state of motor and load of an axis at the start of a tick of the last position cycle.
     #[inline]
-    pub fn motor(&self, axis: usize, tick: usize) -> MotorState {
-        with_lane!(&self.blocks, axis, block_and_lane, |block, lane| block.motors[tick].0.lane(lane))
+    pub fn drive(&self, axis: usize, tick: usize) -> DriveState {
+        with_lane!(&self.blocks, axis, block_and_lane, |block, lane| {
+            let load = block.loads.get(tick).map_or(LoadState::default(), |row| row.0.lane(lane));
+            (block.motors[tick].0.lane(lane), load)
+        })
     }
 
-    /// Writes the motor angles of an axis at the ticks of the last position cycle to `angles`, rad.
+    /// Returns the current of an axis at the start of a tick of the last position cycle, A.
+    #[inline]
+    pub fn current(&self, axis: usize, tick: usize) -> f64 {
+        with_lane!(&self.blocks, axis, block_and_lane, |block, lane| block.motors[tick].0.current[lane])
+    }
+
+    /// Writes the angles of the load of an axis at the ticks of the last position cycle to `angles`, rad of the motor.
     #[inline]
     pub fn angles(&self, axis: usize, angles: &mut [f64]) {
         with_lane!(&self.blocks, axis, block_and_lane, |block, lane| {
             angles.iter_mut().zip(&block.motors).for_each(|(angle, row)| *angle = row.0.angle[lane]);
+            angles.iter_mut().zip(&block.loads).for_each(|(angle, row)| *angle -= row.0.wind_up[lane]);
         });
     }
 

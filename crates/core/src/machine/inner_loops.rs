@@ -9,7 +9,7 @@ use std::hint::black_box;
 use pulp::Simd;
 
 use crate::control::{Pi, PiState};
-use crate::drive::{FrictionExpansion, GravityExpansion, MotorState, Plant};
+use crate::drive::{FrictionExpansion, GravityExpansion, LoadState, MotorState, Plant};
 use crate::simd::{SimdLoad, SimdReal, Unroll2, Vector, soa_struct};
 use crate::state_codec::StateCodec;
 
@@ -28,6 +28,7 @@ soa_struct! {
     #[derive(Debug, Clone, Copy, Default, PartialEq)]
     pub(super) struct InnerLoopState {
         pub motor: MotorState<N>,
+        pub load: LoadState<N>,
         pub velocity: PiState<N>,
         pub current: PiState<N>,
         /// i*, A.
@@ -187,10 +188,14 @@ pub(super) struct AxisBlock<const L: usize> {
     span_state: Aligned<SpanState<[f64; L]>>,
     /// True if gravity of any axis depends on its position.
     has_tilting_axis: bool,
+    /// True if the transmission of any axis is elastic.
+    has_elastic_axis: bool,
     /// Friction compensation of each velocity cycle, N·m at the motor; empty without compensation.
     compensation: Vec<Aligned<[f64; L]>>,
     /// Motor states at the start of each tick.
     pub motors: Vec<Aligned<MotorState<[f64; L]>>>,
+    /// States of the loads at the start of each tick; empty without an elastic axis.
+    pub loads: Vec<Aligned<LoadState<[f64; L]>>>,
     /// Record of the first tick, or of each tick if all are recorded.
     pub records: Vec<Aligned<TickRecord<[f64; L]>>>,
 }
@@ -207,8 +212,10 @@ impl<const L: usize> AxisBlock<L> {
             statistics: Aligned(CycleStatistics::default().fill()),
             span_state: Aligned(SpanState::default().fill()),
             has_tilting_axis: loops.plant.gravity.is_position_dependent(),
+            has_elastic_axis: false,
             compensation: Vec::new(),
             motors: vec![Aligned(MotorState::default().fill()); ticks.position],
+            loads: Vec::new(),
             records: vec![Aligned(TickRecord::default().fill())],
         }
     }
@@ -248,6 +255,9 @@ impl<const L: usize> AxisBlock<L> {
         for row in &mut self.motors {
             code!(row);
         }
+        for row in &mut self.loads {
+            code!(row);
+        }
         for row in &mut self.records[..records] {
             code!(row);
         }
@@ -267,17 +277,22 @@ impl<const L: usize> AxisBlock<L> {
     pub fn set_loops(&mut self, lane: usize, loops: &InnerLoops) {
         self.loops.0.set_lane(lane, loops);
         self.expand(lane);
-        self.has_tilting_axis =
-            (0..L).any(|lane| self.loops.0.lane(lane).plant.gravity.is_position_dependent());
+        let any = |is: fn(&Plant) -> bool| (0..L).any(|lane| is(&self.loops.0.lane(lane).plant));
+        self.has_tilting_axis = any(|plant| plant.gravity.is_position_dependent());
+        self.has_elastic_axis = any(|plant| plant.transmission.is_elastic());
+        let rows = if self.has_elastic_axis { self.motors.len() } else { 0 };
+        self.loads.resize_with(rows, || Aligned(LoadState::default().fill()));
     }
 
     /// Expands friction and gravity of a lane at its present speed and angle.
     fn expand(&mut self, lane: usize) {
-        let (plant, motor) = (&self.loops.0.plant, &self.state.0.motor);
+        let (plant, motor, load) = (&self.loops.0.plant, &self.state.0.motor, &self.state.0.load);
         self.friction_expansion
             .0
             .set_lane(lane, &plant.friction_speed_drop.lane(lane).expand(motor.speed[lane]));
-        self.gravity_expansion.0.set_lane(lane, &plant.gravity.lane(lane).expand(motor.angle[lane]));
+        self.gravity_expansion
+            .0
+            .set_lane(lane, &plant.gravity.lane(lane).expand(motor.angle[lane] - load.wind_up[lane]));
     }
 
     /// Sets the friction compensation of a lane; `torque` returns N·m at the motor for each velocity cycle.
@@ -323,11 +338,14 @@ impl<const L: usize> AxisBlock<L> {
         assert!(L.is_multiple_of(N::LANES), "a vector is no wider than a block");
         let is_whole = span.first == 0 && span.end == ticks.position;
         for index in 0..L / N::LANES {
+            // With more of the three true, only the time differs.
             match (is_whole, self.has_tilting_axis) {
-                (true, false) => self.run_chunk::<S, N, false, false>(simd, index, ticks, span),
-                (true, true) => self.run_chunk::<S, N, true, false>(simd, index, ticks, span),
-                // The difference is time only.
-                (false, _) => self.run_chunk::<S, N, true, true>(simd, index, ticks, span),
+                _ if self.has_elastic_axis => {
+                    self.run_chunk::<S, N, true, true, true>(simd, index, ticks, span)
+                }
+                (true, false) => self.run_chunk::<S, N, false, false, false>(simd, index, ticks, span),
+                (true, true) => self.run_chunk::<S, N, true, false, false>(simd, index, ticks, span),
+                (false, _) => self.run_chunk::<S, N, true, true, false>(simd, index, ticks, span),
             }
         }
     }
@@ -335,7 +353,13 @@ impl<const L: usize> AxisBlock<L> {
     /// Runs the lanes `index`·`N::LANES` … (`index` + 1)·`N::LANES` − 1; see [`run`](Self::run). With `IS_PART` false,
     /// the span is a whole position cycle.
     #[inline(always)]
-    fn run_chunk<S: Simd, N: SimdLoad<S>, const HAS_TILTING_AXIS: bool, const IS_PART: bool>(
+    fn run_chunk<
+        S: Simd,
+        N: SimdLoad<S>,
+        const HAS_TILTING_AXIS: bool,
+        const IS_PART: bool,
+        const HAS_ELASTIC_AXIS: bool,
+    >(
         &mut self,
         simd: S,
         index: usize,
@@ -363,7 +387,10 @@ impl<const L: usize> AxisBlock<L> {
         } else {
             state.max_current_excess = zero;
             match HAS_TILTING_AXIS {
-                true => loops.plant.gravity_torque_with_expansion(&mut gravity_expansion, state.motor.angle),
+                true => loops.plant.gravity_torque_with_expansion(
+                    &mut gravity_expansion,
+                    state.load_angle::<HAS_ELASTIC_AXIS>(),
+                ),
                 false => loops.plant.weight_torque(),
             }
         };
@@ -391,20 +418,25 @@ impl<const L: usize> AxisBlock<L> {
                     .friction_speed_drop
                     .bound_with_expansion(&mut friction_expansion, state.motor.speed);
                 self.motors[tick].0.store(index, &state.motor);
+                if HAS_ELASTIC_AXIS {
+                    self.loads[tick].0.store(index, &state.load);
+                }
                 if tick > 0 && (record_all || HAS_TILTING_AXIS) {
                     state.friction = loops.plant.torque_from_speed_drop(speed_drop);
                     state.gravity = gravity;
                     if HAS_TILTING_AXIS {
-                        gravity = loops
-                            .plant
-                            .gravity_torque_with_expansion(&mut gravity_expansion, state.motor.angle);
+                        let angle = state.load_angle::<HAS_ELASTIC_AXIS>();
+                        gravity = loops.plant.gravity_torque_with_expansion(&mut gravity_expansion, angle);
                         external = inputs.load - gravity;
                     }
                 }
                 let (voltage, saturated) = loops.control_current(&mut state, excess);
                 saturated_ticks = (saturated_ticks + one).select(saturated, saturated_ticks);
-                speed_drop =
-                    loops.plant.step_with_torques(&mut state.motor, voltage, external, max_speed_drop);
+                let (motor, load) = (&mut state.motor, &mut state.load);
+                speed_drop = match HAS_ELASTIC_AXIS {
+                    true => loops.plant.step_elastic(motor, load, voltage, external, max_speed_drop),
+                    false => loops.plant.step_with_torques(motor, voltage, external, max_speed_drop),
+                };
                 if record_all || tick == 0 {
                     let InnerLoopState { current_setpoint, friction, gravity, .. } = state;
                     let saturated = one.select(saturated, zero);
@@ -432,6 +464,14 @@ impl<const L: usize> AxisBlock<L> {
             statistics.peak_speed = motor.speed.abs().max(statistics.peak_speed);
         }
         self.statistics.0.store(index, &statistics);
+    }
+}
+
+impl<N: SimdReal> InnerLoopState<N> {
+    /// Returns the angle of the load, rad of the motor.
+    #[inline(always)]
+    fn load_angle<const HAS_ELASTIC_AXIS: bool>(&self) -> N {
+        if HAS_ELASTIC_AXIS { self.motor.angle - self.load.wind_up } else { self.motor.angle }
     }
 }
 

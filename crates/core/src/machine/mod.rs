@@ -379,7 +379,7 @@ impl Machine {
     /// Sets the samples of all axes to a tick of the last position cycle.
     fn update_samples(&mut self, tick: usize) {
         for (index, (axis, p)) in self.axes.iter_mut().zip(&self.parameters.axes).enumerate() {
-            axis.update_sample(p, tick, &self.bank.motor(index, tick), &self.bank.record(index, tick));
+            axis.update_sample(p, tick, &self.bank.drive(index, tick), &self.bank.record(index, tick));
         }
     }
 
@@ -389,7 +389,7 @@ impl Machine {
     /// Panics if the axis or the tick is out of range.
     #[inline]
     pub fn position(&self, axis: usize, tick: usize) -> f64 {
-        self.parameters.axes[axis].loops.plant.position(self.bank.motor(axis, tick).angle)
+        self.motion_at(axis, tick)[0]
     }
 
     /// Returns position, velocity (m, m/s or rad, rad/s) and current (A) of an axis at a tick of the last position
@@ -399,8 +399,8 @@ impl Machine {
     /// Panics if the axis or the tick is out of range.
     #[inline]
     pub fn motion_at(&self, axis: usize, tick: usize) -> [f64; 3] {
-        let (plant, motor) = (&self.parameters.axes[axis].loops.plant, self.bank.motor(axis, tick));
-        [plant.position(motor.angle), plant.velocity(motor.speed), motor.current]
+        let (motor, load) = self.bank.drive(axis, tick);
+        self.parameters.axes[axis].loops.plant.motion(&motor, &load)
     }
 
     /// Returns position, velocity (m, m/s or rad, rad/s) and current (A) of an axis at the end of the last position cycle,
@@ -409,8 +409,8 @@ impl Machine {
     /// # Panics
     /// Panics if the axis is out of range.
     pub fn motion_at_end(&self, axis: usize) -> [f64; 3] {
-        let (plant, motor) = (&self.parameters.axes[axis].loops.plant, self.bank.state(axis).motor);
-        [plant.position(motor.angle), plant.velocity(motor.speed), motor.current]
+        let state = self.bank.state(axis);
+        self.parameters.axes[axis].loops.plant.motion(&state.motor, &state.load)
     }
 
     /// Writes the positions of an axis at the ticks of the last position cycle to `positions`, m or rad, up to its
@@ -430,7 +430,7 @@ impl Machine {
     /// # Panics
     /// Panics if the axis is out of range.
     pub fn signed_peak_current(&self, axis: usize) -> f64 {
-        let currents = (0..self.ticks_per_period()).map(|tick| self.bank.motor(axis, tick).current);
+        let currents = (0..self.ticks_per_period()).map(|tick| self.bank.current(axis, tick));
         currents
             .fold(0.0, |largest: f64, current| if current.abs() > largest.abs() { current } else { largest })
     }

@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use crate::config::{AxisConfig, MotorConfig, Periods};
+use crate::config::{AxisConfig, MotorConfig, Periods, PositionFeedback, TransmissionConfig};
 use crate::control::{Pi, PiState};
 use crate::design::polynomial::product;
 use crate::design::{DesignError, PredictionModel};
-use crate::drive::{Motor, MotorState, Plant};
+use crate::drive::{LoadState, Motor, MotorState, Plant, Transmission};
 use crate::units::seconds;
 
 use super::AxisError;
@@ -14,10 +14,10 @@ use super::AxisError;
 /// Growth of the Markov parameters beyond which the inner loops count as unstable: the first parameter is lost to
 /// rounding.
 const MAX_GROWTH: f64 = 1e9;
-/// States from one position cycle to the next: i, ω, the two integrals, and θ.
-const STATES: usize = 5;
-/// States that the increments of θ depend on: all but θ.
-const VELOCITY_STATES: usize = STATES - 1;
+/// States of a rigid axis from one position cycle to the next: i, ω, the two integrals, and θ.
+const RIGID_STATES: usize = 5;
+/// States of an elastic axis: wind-up and speed of the load in addition.
+const ELASTIC_STATES: usize = 7;
 /// Hankel singular values of the velocity, relative to the largest, up to which states are left out: their share of θ
 /// is far below 1e-9.
 const NEGLIGIBLE_SINGULAR_VALUE: f64 = 1e-12;
@@ -31,7 +31,7 @@ const NEGLIGIBLE_SINGULAR_VALUE: f64 = 1e-12;
 /// # Errors
 /// [`AxisError`] if the motor cannot be discretized, or the inner loops are unstable or have no gain.
 pub fn prediction_model(axis: &AxisConfig, periods: &Periods) -> Result<PredictionModel, AxisError> {
-    model_with_motor(axis, &axis.motor, periods)
+    model_with_drive(axis, &axis.motor, axis.transmission.as_ref(), periods)
 }
 
 /// Computes the prediction model of the plant with its deviation, under inner loops tuned for the nominal plant.
@@ -39,44 +39,57 @@ pub fn prediction_model(axis: &AxisConfig, periods: &Periods) -> Result<Predicti
 /// # Errors
 /// [`AxisError`] if the motor cannot be discretized, or the inner loops are unstable or have no gain.
 pub fn deviating_plant_model(axis: &AxisConfig, periods: &Periods) -> Result<PredictionModel, AxisError> {
-    model_with_motor(axis, &Plant::deviating_motor(axis), periods)
+    let transmission = Plant::deviating_transmission(axis);
+    model_with_drive(axis, &Plant::deviating_motor(axis), transmission.as_ref(), periods)
 }
 
-/// Computes the prediction model of `axis` with another motor.
-fn model_with_motor(
+/// Computes the prediction model of `axis` with another motor and transmission.
+fn model_with_drive(
     axis: &AxisConfig,
     motor: &MotorConfig,
+    transmission: Option<&TransmissionConfig>,
     periods: &Periods,
 ) -> Result<PredictionModel, AxisError> {
-    let loops = LinearInnerLoops::new(axis, motor, periods)?;
-    let (transition, input) = loops.state_space();
-    // θ(k + 1) − θ(k) = C x(k) + D Ω*(k) has no integrator.
-    let markov = increment_markov_parameters(&transition, &input, 2 * VELOCITY_STATES + 1);
-    let (poles, numerator) = minimal_realization(&markov)?;
+    let loops = LinearInnerLoops::new(axis, motor, transmission, periods)?;
+    let (poles, numerator) = match transmission {
+        None => loops.realization::<RIGID_STATES>()?,
+        Some(_) => loops.realization::<ELASTIC_STATES>()?,
+    };
     let a = product(&[1.0, -1.0], &poles);
     Ok(PredictionModel::new(a, numerator, seconds(periods.position))?)
 }
 
-/// Inner loops without limits, and the motor.
+/// Inner loops without limits, motor and load.
 struct LinearInnerLoops {
     motor: Motor,
+    transmission: Transmission,
+    feedback: PositionFeedback,
     velocity: Pi,
     current: Pi,
     ticks_per_position: u64,
     ticks_per_velocity: u64,
 }
 
-/// Largest number of iterations of the singular value decomposition (4×4); about ten are usual.
+/// Largest number of iterations of the singular value decomposition (4×4 or 6×6); about ten are usual.
 const SVD_ITERATIONS: usize = 1000;
 
-type State = SVector<f64, STATES>;
-
 impl LinearInnerLoops {
-    fn new(axis: &AxisConfig, motor: &MotorConfig, periods: &Periods) -> Result<Self, AxisError> {
+    fn new(
+        axis: &AxisConfig,
+        motor: &MotorConfig,
+        transmission: Option<&TransmissionConfig>,
+        periods: &Periods,
+    ) -> Result<Self, AxisError> {
         let tick = seconds(periods.current);
+        let (motor, transmission) = match transmission {
+            Some(elastic) => Transmission::new(motor, elastic, tick)?,
+            None => (Motor::new(motor, tick)?, Transmission::rigid()),
+        };
         let (unlimited, torque_constant) = (f64::INFINITY, axis.motor.torque_constant);
         Ok(LinearInnerLoops {
-            motor: Motor::new(motor, tick)?,
+            motor,
+            transmission,
+            feedback: axis.position_loop.feedback,
             velocity: Pi::new(
                 &axis.velocity_loop,
                 seconds(periods.velocity),
@@ -89,9 +102,29 @@ impl LinearInnerLoops {
         })
     }
 
+    /// Computes denominator and numerator of the increments of θ.
+    fn realization<const STATES: usize>(&self) -> Result<(Vec<f64>, Vec<f64>), DesignError> {
+        let (transition, input) = self.state_space::<STATES>();
+        // θ(k + 1) − θ(k) = C x(k) + D Ω*(k) has no integrator: it depends on all states but θ.
+        let order = STATES - 1;
+        let output = |state: &SVector<f64, STATES>| match (self.feedback, STATES) {
+            (PositionFeedback::Load, ELASTIC_STATES) => state[4] - state[5],
+            _ => state[4],
+        };
+        minimal_realization(&increment_markov_parameters(&transition, &input, output, 2 * order + 1), order)
+    }
+
     /// Returns the state after one position cycle under `setpoint` (Ω*, rad/s).
-    fn state_after_cycle(&self, state: &State, setpoint: f64) -> State {
+    fn state_after_cycle<const STATES: usize>(
+        &self,
+        state: &SVector<f64, STATES>,
+        setpoint: f64,
+    ) -> SVector<f64, STATES> {
         let mut motor = MotorState { current: state[0], speed: state[1], angle: state[4] };
+        let mut load = match STATES {
+            ELASTIC_STATES => LoadState { wind_up: state[5], speed: state[6] },
+            _ => LoadState::default(),
+        };
         let mut velocity = PiState { integral: state[2], excess: 0.0 };
         let mut current = PiState { integral: state[3], excess: 0.0 };
         let mut current_setpoint = 0.0;
@@ -101,30 +134,35 @@ impl LinearInnerLoops {
                     self.velocity.update_with_feedforward(&mut velocity, setpoint - motor.speed, 0.0);
             }
             let voltage = self.current.update(&mut current, current_setpoint - motor.current);
-            motor = self.motor.step(&motor, voltage, 0.0);
+            (motor, load) = self.transmission.step(&self.motor, &motor, &load, voltage, 0.0);
         }
-        State::new(motor.current, motor.speed, velocity.integral, current.integral, motor.angle)
+        let rigid = [motor.current, motor.speed, velocity.integral, current.integral, motor.angle];
+        SVector::from_iterator(rigid.into_iter().chain([load.wind_up, load.speed]))
     }
 
     /// Returns Φ and Γ of `x(k + 1) = Φ x(k) + Γ Ω*(k)` over one position cycle.
-    fn state_space(&self) -> (SMatrix<f64, STATES, STATES>, State) {
-        let column = |k: usize| self.state_after_cycle(&State::ith(k, 1.0), 0.0);
-        (SMatrix::from_columns(&[0, 1, 2, 3, 4].map(column)), self.state_after_cycle(&State::zeros(), 1.0))
+    fn state_space<const STATES: usize>(&self) -> (SMatrix<f64, STATES, STATES>, SVector<f64, STATES>) {
+        let column = |k: usize| {
+            self.state_after_cycle(&SVector::from_fn(|row, _| if row == k { 1.0 } else { 0.0 }), 0.0)
+        };
+        let columns: [_; STATES] = std::array::from_fn(column);
+        (SMatrix::from_columns(&columns), self.state_after_cycle(&SVector::zeros(), 1.0))
     }
 }
 
-/// Computes the first `count` Markov parameters of the increments θ(k) − θ(k − 1).
-fn increment_markov_parameters(
+/// Computes the first `count` Markov parameters of the increments of `output`, θ(k) − θ(k − 1).
+fn increment_markov_parameters<const STATES: usize>(
     transition: &SMatrix<f64, STATES, STATES>,
-    input: &State,
+    input: &SVector<f64, STATES>,
+    output: impl Fn(&SVector<f64, STATES>) -> f64,
     count: usize,
 ) -> Vec<f64> {
     let mut state = *input;
     let mut angle = 0.0;
     let mut markov = Vec::with_capacity(count);
     for _ in 0..count {
-        markov.push(state[4] - angle);
-        angle = state[4];
+        markov.push(output(&state) - angle);
+        angle = output(&state);
         state = transition * state;
     }
     markov
@@ -135,9 +173,8 @@ fn increment_markov_parameters(
 /// The first parameter is the feedthrough; the others are realized by the Ho–Kalman algorithm from the singular value
 /// decomposition of their Hankel matrix. The numerator contains one more q⁻¹, since an increment ends one position
 /// cycle later.
-fn minimal_realization(markov: &[f64]) -> Result<(Vec<f64>, Vec<f64>), DesignError> {
-    const SIZE: usize = VELOCITY_STATES;
-    let hankel = |shift: usize| DMatrix::from_fn(SIZE, SIZE, |i, j| markov[i + j + shift]);
+fn minimal_realization(markov: &[f64], order: usize) -> Result<(Vec<f64>, Vec<f64>), DesignError> {
+    let hankel = |shift: usize| DMatrix::from_fn(order, order, |i, j| markov[i + j + shift]);
     if !markov.iter().all(|h| h.is_finite()) {
         return Err(DesignError::UnstableInnerLoops("diverge within a position cycle".to_owned()));
     }
@@ -160,7 +197,7 @@ fn minimal_realization(markov: &[f64]) -> Result<(Vec<f64>, Vec<f64>), DesignErr
     let (u, vt) = (decomposition.u.ok_or_else(no_model)?, decomposition.v_t.ok_or_else(no_model)?);
     let values = decomposition.singular_values;
     let largest = values.max();
-    let kept: Vec<usize> = (0..SIZE).filter(|&k| values[k] > NEGLIGIBLE_SINGULAR_VALUE * largest).collect();
+    let kept: Vec<usize> = (0..order).filter(|&k| values[k] > NEGLIGIBLE_SINGULAR_VALUE * largest).collect();
     let root = DVector::from_iterator(kept.len(), kept.iter().map(|&k| values[k].sqrt()));
     let (left, right) = (u.select_columns(&kept), vt.select_rows(&kept));
     let mut transition = left.transpose() * hankel(2) * right.transpose();

@@ -11,9 +11,12 @@ pub struct AxisSample {
     pub psec: f64,
     /// Setpoint at the input of the position controller, delayed by α: `PSEC_floor(k − α/Tsp)`, m or rad.
     pub delayed_psec: f64,
-    /// SP, simulated position, m or rad.
+    /// SP, simulated position, m or rad; that of the load with an elastic transmission.
     pub position: f64,
-    /// SV, simulated velocity, m/s or rad/s.
+    /// Wind-up of an elastic transmission: position of the motor at the axis minus that of the load, m or rad; 0 for a
+    /// rigid axis.
+    pub wind_up: f64,
+    /// SV, simulated velocity, m/s or rad/s; that of the load with an elastic transmission.
     pub velocity: f64,
     /// SMC, simulated motor current i, A.
     pub current: f64,
@@ -51,6 +54,7 @@ impl AxisSample {
             &mut self.psec,
             &mut self.delayed_psec,
             &mut self.position,
+            &mut self.wind_up,
             &mut self.velocity,
             &mut self.current,
             &mut self.current_setpoint,

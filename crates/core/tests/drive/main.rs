@@ -8,3 +8,4 @@ mod partial_cycles;
 mod scalar_c;
 mod simd;
 mod stored_states;
+mod transmission;

@@ -32,6 +32,7 @@ SIGNALS = (
     "gravity_current",
     "load_current",
     "effort",
+    "wind_up",
 )
 """Names of the signals of an axis: m or rad at the axis, rad/s and N·m at the motor, A, V; effort in N or N·m."""
 

@@ -4,7 +4,8 @@ use std::f64::consts::TAU;
 
 use virtual_axes_core::config::{
     AxisConfig, AxisKind, DelaysConfig, DeviationConfig, FeedforwardConfig, FrictionConfig, GravityConfig,
-    LimitsConfig, MotorConfig, Periods, PiConfig, PositionControllerConfig, PositionLoopConfig,
+    LimitsConfig, MotorConfig, Periods, PiConfig, PositionControllerConfig, PositionFeedback,
+    PositionLoopConfig,
 };
 use virtual_axes_core::units::{
     METER_PER_MINUTE, MICROSECOND_NS, MILLIMETER, MILLISECOND_NS, Nanoseconds, POSITION_GAIN,
@@ -134,11 +135,13 @@ pub(super) fn draw_axis(
     AxisConfig {
         name: name.to_owned(),
         kind: AxisKind::Linear,
+        transmission: None,
         transmission_ratio: mechanics.ratio,
         motor,
         friction,
         gravity: GravityConfig { weight: mechanics.weight, tilt: 0.0, phase: 0.0 },
         position_loop: PositionLoopConfig {
+            feedback: PositionFeedback::Motor,
             gain: random.between(1.5, 3.5) * POSITION_GAIN,
             controller: PositionControllerConfig::Cascade,
             allow_unstable: false,

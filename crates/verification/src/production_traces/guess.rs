@@ -2,7 +2,7 @@
 
 use virtual_axes_core::config::{
     AxisConfig, DelaysConfig, FeedforwardConfig, FrictionConfig, GravityConfig, MachineConfig, MotorConfig,
-    Periods, PiConfig, PositionControllerConfig, PositionLoopConfig,
+    Periods, PiConfig, PositionControllerConfig, PositionFeedback, PositionLoopConfig,
 };
 use virtual_axes_core::units::{MICROSECOND_NS, MILLISECOND_NS, Nanoseconds, POSITION_GAIN};
 
@@ -67,6 +67,7 @@ impl HiddenAxis {
             friction: FrictionConfig { a: 0.0, b: 0.01965, c: 0.0, d: -0.2801, i0: 0.0 },
             gravity: GravityConfig { weight: 0.0, tilt: 0.0, phase: 0.0 },
             position_loop: PositionLoopConfig {
+                feedback: PositionFeedback::Motor,
                 gain: if is_gain_known { hidden.position_loop.gain } else { DEFAULT_GAIN * POSITION_GAIN },
                 controller: PositionControllerConfig::Cascade,
                 allow_unstable: false,
