@@ -11,6 +11,7 @@ mod identify_command;
 mod identify_traces;
 mod ingress_properties;
 mod interface;
+mod learn_command;
 mod limit_audit;
 mod output_form;
 mod part_programs;

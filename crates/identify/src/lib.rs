@@ -1,10 +1,11 @@
-//! Identification of drive parameters from recordings, and tuning of position controllers.
+//! Identification of drive parameters from recordings, tuning of position controllers, and iterative learning.
 //!
-//! Three modules, each usable on its own:
+//! Four modules, each usable on its own:
 //! - [`recording`] conditions raw recordings of an axis: time grid, gaps, zero-phase filter, plausibility.
 //! - [`mod@identify`] plans identification campaigns and identifies gravity, friction, inertia, feedforward
 //!   weights and delays of an axis (Prévost section 3).
 //! - [`tune`] searches controller tunings that minimize a cost on a path.
+//! - [`learn`] learns setpoints that compensate the repeatable errors of a motion.
 //!
 //! The crate root re-exports the functions [`condition`] and [`identify()`] with their arguments and results.
 //!
@@ -58,6 +59,7 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
 
 pub mod identify;
+pub mod learn;
 pub mod recording;
 pub mod tune;
 

@@ -19,6 +19,8 @@ mod input;
 mod interface;
 mod interrupt;
 mod json;
+mod learn;
+mod learn_output;
 mod limit_audit;
 mod limit_audit_output;
 mod list;
@@ -83,6 +85,8 @@ enum Command {
     Design(design::DesignArguments),
     /// Optimize the tuning of the position controllers for a path.
     Tune(Box<tune::TuneArguments>),
+    /// Learn setpoints that compensate the repeatable errors of a motion, run after run.
+    Learn(Box<learn::LearnArguments>),
     /// Simulate one tuning on plants with deviating inertia, friction and torque constant.
     Robustness(Box<robustness::RobustnessArguments>),
     /// Identify the parameters of an axis from recordings and write a machine file.
@@ -189,6 +193,7 @@ fn run_command(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Psec(arguments) => psec::run(arguments),
         Command::Design(arguments) => design::run(arguments),
         Command::Tune(arguments) => tune::run(arguments),
+        Command::Learn(arguments) => learn::run(arguments),
         Command::Robustness(arguments) => robustness::run(arguments),
         Command::Identify(arguments) => identify::run(arguments),
         Command::Check(arguments) => check::run(arguments),

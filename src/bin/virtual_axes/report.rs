@@ -34,12 +34,27 @@ pub fn write(
     runs: &[VariantRun],
     scatters: &[Scatter],
 ) -> Result<(), Box<dyn Error>> {
+    write_with_sections(path, input, machine, runs, scatters, Vec::new())
+}
+
+/// Writes the page atomically, with `sections` before those of the part programs.
+pub fn write_with_sections(
+    path: &Path,
+    input: &CommandInput,
+    machine: &ReportMachine,
+    runs: &[VariantRun],
+    scatters: &[Scatter],
+    sections: Vec<Section>,
+) -> Result<(), Box<dyn Error>> {
     let page = SimulationPage {
         title: input.name(),
         description: input.description(),
         machine: &machine.title,
         runs,
-        sections: runs.iter().filter_map(|run| part_program(run, runs.len())).collect(),
+        sections: sections
+            .into_iter()
+            .chain(runs.iter().filter_map(|run| part_program(run, runs.len())))
+            .collect(),
         scatters,
         provenance: provenance(machine),
     };

@@ -1,7 +1,8 @@
 //! Design of position controllers from a prediction model: P, PI, PID, pole placement, generalized predictive control
-//! (GPC), stability and margins.
+//! (GPC), stability and margins; filters of iterative learning control.
 
 mod gpc;
+mod learning;
 mod margins;
 mod model;
 mod pid;
@@ -10,6 +11,7 @@ mod poles;
 pub(crate) mod polynomial;
 
 pub use gpc::{ControlWeight, GpcTuning, gpc};
+pub use learning::{Contraction, ImpulseResponse, LEARNING_GAIN, LearningFilter, LearningTuning};
 pub use margins::{Margins, margins};
 pub use model::PredictionModel;
 pub use pid::{MAX_GAIN, PidTuning, p_controller, pi_controller, pid_controller};
@@ -100,6 +102,30 @@ pub enum DesignError {
         re: f64,
         /// Imaginary part.
         im: f64,
+    },
+    /// Filters of iterative learning control that do not reduce the error at every frequency.
+    #[error(
+        "the learning does not converge: |Q (1 − L T)| is {} at {frequency:.1} Hz with a bandwidth of {} Hz and a \
+         learning gain of {}; it must be below 1 at every frequency; reduce the bandwidth or the learning gain",
+        Rounded(*factor), Rounded(*bandwidth), Rounded(*gain)
+    )]
+    NotContracting {
+        /// Largest |Q (1 − L T)|.
+        factor: f64,
+        /// Its frequency, Hz.
+        frequency: f64,
+        /// Bandwidth of Q, Hz.
+        bandwidth: f64,
+        /// Learning gain.
+        gain: f64,
+    },
+    /// Closed loop whose impulse response does not end.
+    #[error(
+        "the position has not settled {cycles} position cycles after an impulse of the setpoint; it must settle"
+    )]
+    NotSettling {
+        /// Position cycles that were computed.
+        cycles: usize,
     },
     /// Designed polynomials that do not form a controller.
     #[error(transparent)]

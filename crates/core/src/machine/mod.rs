@@ -5,6 +5,7 @@
 
 mod axis;
 mod bank;
+mod closed_loop;
 mod compensation;
 mod controller;
 mod inner_loops;
@@ -14,6 +15,7 @@ mod stored;
 
 pub use axis::{Axis, AxisParameters};
 pub use bank::SimdWidth;
+pub use closed_loop::closed_loop_response;
 pub use controller::{FALLBACK_DELAY, design_controller};
 pub use prediction::{deviating_plant_model, prediction_model};
 pub use sample::AxisSample;

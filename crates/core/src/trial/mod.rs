@@ -21,7 +21,7 @@ pub use figures::{
     AxisFigures, BidirectionalFigures, CircleFigures, ContourFigures, CornerFigures, Figures,
     OrientationFigures, Reference,
 };
-pub use run::{run, trace};
+pub use run::{run, run_compensated, trace};
 pub use setpoints::{
     GridRows, GridSource, ProgramSource, Requests, SetpointSource, SourceError, UnreachableError,
 };

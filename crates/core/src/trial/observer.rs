@@ -64,6 +64,9 @@ pub(super) struct Observer<'a> {
     /// Buffer for future setpoints.
     preview: Vec<f64>,
     has_preview: bool,
+    /// Programmed setpoints that the polyline runs through, instead of the setpoints of the simulation; m or rad, a row of
+    /// all axes per position cycle.
+    programmed: Option<&'a [f64]>,
     /// Tool poses of the position cycle and their deviations.
     poses: Poses,
     deviations: PathDeviations,
@@ -101,6 +104,7 @@ impl<'a> Observer<'a> {
             start: start.to_vec(),
             preview: start.to_vec(),
             has_preview: false,
+            programmed: None,
             poses: Poses::default(),
             deviations: PathDeviations::default(),
             contour: ErrorStatistics::default(),
@@ -112,6 +116,11 @@ impl<'a> Observer<'a> {
             recorder: trial.record.then(|| SignalRecorder::new(count)),
             kinematics,
         }
+    }
+
+    /// Sets the programmed setpoints that contour errors are measured against without a known path.
+    pub(super) fn set_programmed(&mut self, rows: &'a [f64]) {
+        self.programmed = Some(rows);
     }
 
     /// Returns true if the figures need the positions at every tick.
@@ -253,8 +262,15 @@ impl<'a> Observer<'a> {
         let first = if self.has_preview { horizon } else { 0 };
         self.has_preview = true;
         for periods in first..=horizon {
-            for (joint, value) in self.preview.iter_mut().enumerate() {
-                *value = simulation.psec_ahead(joint, periods).unwrap_or(*value);
+            if let Some(rows) = self.programmed {
+                let index = usize::try_from(simulation.next_instant() + i64::from(periods)).unwrap_or(0);
+                if let Some(row) = rows.chunks_exact(self.preview.len().max(1)).nth(index) {
+                    self.preview.copy_from_slice(row);
+                }
+            } else {
+                for (joint, value) in self.preview.iter_mut().enumerate() {
+                    *value = simulation.psec_ahead(joint, periods).unwrap_or(*value);
+                }
             }
             tracker.push(self.kinematics.forward(&self.preview));
         }

@@ -21,14 +21,38 @@ use super::submitter::TrajectorySubmitter;
 pub fn run(
     trial: &Trial<'_>,
     setpoints: SetpointSource<'_>,
-    mut callback: impl FnMut(Tick<'_>) -> io::Result<()>,
+    callback: impl FnMut(Tick<'_>) -> io::Result<()>,
 ) -> Result<TrialOutcome, TrialError> {
-    run_with(trial, setpoints, |simulation| {
+    run_with(trial, setpoints, None, cycle_step(callback))
+}
+
+/// Runs compensated `setpoints` as [`run`] does and measures contour errors against the `programmed` ones where the path
+/// is not known.
+///
+/// `programmed` has a row of all axes per position cycle from time 0, m or rad; the last row holds. The following errors
+/// of the axes are those against the compensated setpoints.
+///
+/// # Errors
+/// Returns [`TrialError`] as [`run`] does.
+pub fn run_compensated(
+    trial: &Trial<'_>,
+    setpoints: SetpointSource<'_>,
+    programmed: &[f64],
+    callback: impl FnMut(Tick<'_>) -> io::Result<()>,
+) -> Result<TrialOutcome, TrialError> {
+    run_with(trial, setpoints, Some(programmed), cycle_step(callback))
+}
+
+/// Returns a step of one position cycle that calls `callback`.
+fn cycle_step(
+    mut callback: impl FnMut(Tick<'_>) -> io::Result<()>,
+) -> impl FnMut(&mut Simulation) -> io::Result<bool> {
+    move |simulation| {
         let time = simulation.time_of(simulation.next_instant());
         let ran = simulation.step();
         let machine = simulation.machine();
         if ran { callback(Tick { time, position_instant: true, machine }).map(|()| ran) } else { Ok(ran) }
-    })
+    }
 }
 
 /// Runs `setpoints` as [`run`] does and calls `callback` at every tick.
@@ -41,7 +65,7 @@ pub fn trace(
     mut callback: impl FnMut(Tick<'_>) -> io::Result<()>,
 ) -> Result<TrialOutcome, TrialError> {
     let tick = trial.machine.periods().current;
-    run_with(trial, setpoints, |simulation| {
+    run_with(trial, setpoints, None, |simulation| {
         let mut time = simulation.time_of(simulation.next_instant());
         let mut result = Ok(());
         let ran = simulation.step_with(|machine, position_instant| {
@@ -58,10 +82,14 @@ pub fn trace(
 fn run_with(
     trial: &Trial<'_>,
     setpoints: SetpointSource<'_>,
+    programmed: Option<&[f64]>,
     mut step: impl FnMut(&mut Simulation) -> io::Result<bool>,
 ) -> Result<TrialOutcome, TrialError> {
     let (mut simulation, mut submitter, start) = start(trial, setpoints)?;
     let mut observer = Observer::new(trial, &start);
+    if let Some(rows) = programmed {
+        observer.set_programmed(rows);
+    }
     let mut cycle = PositionCycle::new(trial.machine.periods(), start.len());
     loop {
         submitter.submit_due(&mut simulation)?;

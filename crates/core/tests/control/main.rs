@@ -6,5 +6,6 @@ mod design_controllers;
 mod design_margins;
 mod design_poles;
 mod gpc;
+mod learning;
 mod predictive;
 mod predictive_recovery;

@@ -60,6 +60,11 @@ impl Workload {
         &self.name
     }
 
+    /// Returns the path, if known.
+    pub fn program(&self) -> Option<&Arc<Program>> {
+        self.program.as_ref()
+    }
+
     /// Runs the workload on `machine` with [`trial::run`].
     ///
     /// # Errors

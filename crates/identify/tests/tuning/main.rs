@@ -1,4 +1,5 @@
-//! TODO
+//! Tests of tuning and of iterative learning.
 
+mod learn;
 mod tune;
 mod tune_robustness;
