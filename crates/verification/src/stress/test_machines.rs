@@ -32,6 +32,17 @@ pub enum TestMachinesError {
     /// A machine cannot be simulated.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
+    /// An axis has an elastic transmission, which the independent checks do not contain.
+    #[error(
+        "{machine}: axis {axis} has an elastic transmission, the checks of the stress test are those of rigid axes; \
+         remove transmission.stiffness and transmission.load"
+    )]
+    Elastic {
+        /// Name of the machine.
+        machine: String,
+        /// Name of the axis.
+        axis: String,
+    },
     /// The position cycle of a machine has too many ticks.
     #[error(
         "{machine}: a position cycle has {ticks} current cycles, at most {most} are allowed in the stress test",
@@ -191,7 +202,8 @@ impl TestMachines {
     /// Creates all variants of `machines`.
     ///
     /// # Errors
-    /// [`TestMachinesError`] if the list is empty, or if a machine rejects a controller or has too many ticks.
+    /// [`TestMachinesError`] if the list is empty, or if a machine rejects a controller, has an elastic axis or too many
+    /// ticks.
     pub fn new(machines: &[Parameters]) -> Result<Self, TestMachinesError> {
         let mut variants = Vec::new();
         for machine in machines {
@@ -199,6 +211,10 @@ impl TestMachines {
             let ticks = config.periods().ticks_per_position() as usize;
             if ticks * MIN_PERIODS > MAX_TICKS {
                 return Err(TestMachinesError::Ticks { machine: config.name().to_owned(), ticks });
+            }
+            if let Some(axis) = config.axes().iter().find(|axis| axis.transmission.is_some()) {
+                let (machine, axis) = (config.name().to_owned(), axis.name().to_owned());
+                return Err(TestMachinesError::Elastic { machine, axis });
             }
             for (name, laws) in VARIANTS {
                 variants.push(MachineVariant::new(machine, name, laws)?);
