@@ -65,11 +65,12 @@ void VirtualAxesSystem::add_joint(const hardware_interface::ComponentInfo & join
   }
 }
 
-CallbackReturn VirtualAxesSystem::on_init(const hardware_interface::HardwareInfo & info)
+CallbackReturn VirtualAxesSystem::on_init(const InitParams & params)
 {
-  if (hardware_interface::SystemInterface::on_init(info) != CallbackReturn::SUCCESS) {
+  if (hardware_interface::SystemInterface::on_init(params) != CallbackReturn::SUCCESS) {
     return CallbackReturn::ERROR;
   }
+  const hardware_interface::HardwareInfo & info = get_hardware_info();
   command_names_.clear();
   command_axes_.clear();
   outputs_.clear();

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <map>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "virtual_axes_ros2_control/virtual_axes_system.hpp"
@@ -18,6 +19,8 @@ namespace
 
 using hardware_interface::CallbackReturn;
 using hardware_interface::return_type;
+using rclcpp_lifecycle::State;
+using virtual_axes_ros2_control::InitParams;
 using virtual_axes_ros2_control::VirtualAxesSystem;
 
 constexpr std::size_t AXES = 5;
@@ -36,17 +39,25 @@ double wanted(std::size_t axis, std::int64_t time_ns)
   return amplitude / static_cast<double>(1 + axis % 3) * (1.0 - std::cos(angle));
 }
 
+hardware_interface::InterfaceInfo interface(const std::string & name)
+{
+  hardware_interface::InterfaceInfo info{};
+  info.name = name;
+  return info;
+}
+
 hardware_interface::HardwareInfo mill()
 {
-  hardware_interface::HardwareInfo info;
+  hardware_interface::HardwareInfo info{};
   info.name = "mill";
+  info.type = "system";
   info.hardware_parameters = {{"machine", "mikron_ucp710"}};
   for (const auto & name : NAMES) {
-    hardware_interface::ComponentInfo joint;
+    hardware_interface::ComponentInfo joint{};
     joint.name = name;
-    joint.command_interfaces = {{"position"}};
+    joint.command_interfaces = {interface("position")};
     for (const auto & signal : SIGNALS) {
-      joint.state_interfaces.push_back({signal});
+      joint.state_interfaces.push_back(interface(signal));
     }
     info.joints.push_back(joint);
   }
@@ -61,23 +72,54 @@ void require(bool condition, const char * text)
   }
 }
 
+/// Calls `on_init` with a hardware block, in the parameters where the release has them.
+template <typename Params = InitParams>
+CallbackReturn init(VirtualAxesSystem & system, const hardware_interface::HardwareInfo & info)
+{
+  Params params;
+  if constexpr (std::is_same_v<Params, hardware_interface::HardwareInfo>) {
+    params = info;
+  } else {
+    params.hardware_info = info;
+  }
+  return system.on_init(params);
+}
+
+/// Initializes, exports the interfaces, configures and activates, as the resource manager does.
+void start(VirtualAxesSystem & system, const hardware_interface::HardwareInfo & info)
+{
+  require(init(system, info) == CallbackReturn::SUCCESS, "on_init");
+  require(system.on_export_state_interfaces().size() == AXES * SIGNALS.size(), "on_export_state_interfaces");
+  require(system.on_export_command_interfaces().size() == AXES, "on_export_command_interfaces");
+  require(system.on_configure(State()) == CallbackReturn::SUCCESS, "on_configure");
+  require(system.on_activate(State()) == CallbackReturn::SUCCESS, "on_activate");
+}
+
+return_type read(VirtualAxesSystem & system, std::int64_t time_ns, std::int64_t period_ns)
+{
+  return system.read(rclcpp::Time(time_ns), rclcpp::Duration::from_nanoseconds(period_ns));
+}
+
+return_type write(VirtualAxesSystem & system, std::int64_t time_ns, std::int64_t period_ns)
+{
+  return system.write(rclcpp::Time(time_ns), rclcpp::Duration::from_nanoseconds(period_ns));
+}
+
 /// Runs the loop and returns the states at the position cycles.
 Motion run(std::int64_t period_ns)
 {
   VirtualAxesSystem system;
-  require(system.on_init(mill()) == CallbackReturn::SUCCESS, "on_init");
-  require(system.on_configure({}) == CallbackReturn::SUCCESS, "on_configure");
-  require(system.on_activate({}) == CallbackReturn::SUCCESS, "on_activate");
-  std::vector<std::string> start;
+  start(system, mill());
+  std::vector<std::string> commands;
   for (const auto & name : NAMES) {
     require(system.get_command(name + "/position") == 0.0, "commands are positions after on_activate");
-    start.push_back(name + "/position");
+    commands.push_back(name + "/position");
   }
-  require(system.prepare_command_mode_switch(start, {}) == return_type::OK, "prepare_command_mode_switch");
-  require(system.perform_command_mode_switch(start, {}) == return_type::OK, "perform_command_mode_switch");
+  require(system.prepare_command_mode_switch(commands, {}) == return_type::OK, "prepare_command_mode_switch");
+  require(system.perform_command_mode_switch(commands, {}) == return_type::OK, "perform_command_mode_switch");
   Motion motion;
   for (std::int64_t now = period_ns; now <= DURATION_NS; now += period_ns) {
-    require(system.read({now}, {period_ns}) == return_type::OK, "read");
+    require(read(system, now, period_ns) == return_type::OK, "read");
     // The state is that at the present time, or at the position cycle since the last call.
     const std::int64_t cycle = now / TSP_NS * TSP_NS;
     if (cycle > now - period_ns) {
@@ -91,10 +133,10 @@ Motion run(std::int64_t period_ns)
     for (std::size_t axis = 0; axis < AXES; ++axis) {
       system.set_command(NAMES[axis] + "/position", wanted(axis, now));
     }
-    require(system.write({now}, {period_ns}) == return_type::OK, "write");
+    require(write(system, now, period_ns) == return_type::OK, "write");
   }
-  require(system.on_deactivate({}) == CallbackReturn::SUCCESS, "on_deactivate");
-  require(system.on_cleanup({}) == CallbackReturn::SUCCESS, "on_cleanup");
+  require(system.on_deactivate(State()) == CallbackReturn::SUCCESS, "on_deactivate");
+  require(system.on_cleanup(State()) == CallbackReturn::SUCCESS, "on_cleanup");
   return motion;
 }
 
@@ -154,7 +196,7 @@ void compare(const char * name, const Motion & found, const Motion & wanted)
 void rejected(const hardware_interface::HardwareInfo & info)
 {
   VirtualAxesSystem system;
-  require(system.on_init(info) == CallbackReturn::ERROR, "this block must be rejected");
+  require(init(system, info) == CallbackReturn::ERROR, "this block must be rejected");
 }
 
 void errors()
@@ -168,10 +210,10 @@ void errors()
     rejected(info);
   }
   auto info = mill();
-  info.joints[1].command_interfaces = {{"velocity"}};
+  info.joints[1].command_interfaces = {interface("velocity")};
   rejected(info);
   info = mill();
-  info.joints[2].state_interfaces.push_back({"acceleration"});
+  info.joints[2].state_interfaces.push_back(interface("acceleration"));
   rejected(info);
   info = mill();
   info.joints.push_back(info.joints[0]);
@@ -179,16 +221,14 @@ void errors()
   info = mill();
   info.hardware_parameters["controler"] = "gpc";
   VirtualAxesSystem system;
-  require(system.on_init(info) == CallbackReturn::SUCCESS, "on_init");
-  require(system.on_configure({}) == CallbackReturn::SUCCESS, "on_configure");
-  require(system.on_activate({}) == CallbackReturn::SUCCESS, "on_activate");
+  start(system, info);
   require(system.prepare_command_mode_switch({"x/velocity"}, {}) == return_type::ERROR, "velocity is rejected");
   require(system.prepare_command_mode_switch({"gripper/effort"}, {}) == return_type::OK, "other hardware");
   // Without a command, and with one that is not finite, the axes stay; a long pause is cut.
   system.set_command("x/position", std::nan(""));
   for (const std::int64_t period : {2'000'000L, -5L, 0L, 3'600'000'000'000L}) {
-    require(system.read({0}, {period}) == return_type::OK, "read");
-    require(system.write({0}, {period}) == return_type::OK, "write");
+    require(read(system, 0, period) == return_type::OK, "read");
+    require(write(system, 0, period) == return_type::OK, "write");
   }
   require(std::fabs(system.get_state("x/position")) < 1e-9, "the axis stays");
   // The built-in machine has no polynomials for rst.
@@ -199,7 +239,7 @@ void errors()
     with.joints.resize(1);
     with.joints[0].name = "m2";
     VirtualAxesSystem other;
-    require((other.on_init(with) == CallbackReturn::SUCCESS) == (controller != "rst"), controller.c_str());
+    require((init(other, with) == CallbackReturn::SUCCESS) == (controller != "rst"), controller.c_str());
   }
 }
 

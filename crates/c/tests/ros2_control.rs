@@ -15,15 +15,28 @@ const FREQUENCY: f64 = 3.0;
 /// Amplitudes of the commanded motion in host.cpp, m or rad.
 const AMPLITUDES: [f64; 5] = [0.02, 0.01, 0.02 / 3.0, 0.2, 0.1];
 
+/// Argument of `on_init` in releases of ros2_control.
+#[derive(Clone, Copy, Debug)]
+enum InitArgument {
+    /// HardwareComponentInterfaceParams.
+    Params,
+    /// HardwareInfo, in older releases.
+    Info,
+}
+
 /// Compiles plugin and host with g++ and the sanitizers of gcc, and runs it in one mode.
-fn host(mode: &str) -> Output {
+fn host(mode: &str, argument: InitArgument) -> Output {
     let root = folder().join("../../ros2_control");
-    let program = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("ros2_control_{mode}"));
+    let program =
+        PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("ros2_control_{mode}_{argument:?}"));
     let mut compiler = Command::new("g++");
     compiler.args(["-std=c++17", "-Wall", "-Wextra", "-Werror", "-O1"]);
     compiler.args(["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]);
     for include in [root.join("include"), root.join("test/standin"), folder().join("include")] {
         compiler.arg("-I").arg(include);
+    }
+    if matches!(argument, InitArgument::Params) {
+        compiler.arg("-I").arg(root.join("test/standin_params"));
     }
     compiler.arg(root.join("src/virtual_axes_system.cpp")).arg(root.join("test/host.cpp")).arg(library());
     compiler.args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&program);
@@ -35,7 +48,7 @@ fn host(mode: &str) -> Output {
 
 #[test]
 fn a_minute_at_three_update_rates_is_the_same_motion() {
-    let output = host("motion");
+    let output = host("motion", InitArgument::Params);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     println!("comparison, times, different states, differences of setpoints and positions by axis:\n{text}");
     let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(' ').collect()).collect();
@@ -58,8 +71,6 @@ fn a_minute_at_three_update_rates_is_the_same_motion() {
 
 #[test]
 fn invalid_hardware_blocks_are_rejected_with_name_value_and_allowed_values() {
-    let output = host("errors");
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
     let expected = [
         "parameter machine is missing; allowed: name of a built-in machine",
         "nowhere.yaml: cannot be read",
@@ -74,9 +85,13 @@ fn invalid_hardware_blocks_are_rejected_with_name_value_and_allowed_values() {
         "command interface x/velocity is not available; allowed: x/position",
         "x.position_loop.rst.r is missing",
     ];
-    let lines: Vec<&str> = text.lines().collect();
-    assert_eq!(lines.len(), expected.len(), "{text}");
-    for (line, wanted) in lines.iter().zip(expected) {
-        assert!(line.contains(wanted), "{line}: {wanted}");
+    for argument in [InitArgument::Params, InitArgument::Info] {
+        let output = host("errors", argument);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), expected.len(), "{argument:?}: {text}");
+        for (line, wanted) in lines.iter().zip(expected) {
+            assert!(line.contains(wanted), "{argument:?}: {line}: {wanted}");
+        }
     }
 }

@@ -13,8 +13,23 @@
 #include "rclcpp_lifecycle/state.hpp"
 #include "virtual_axes_ros2_control/stepped_axes.hpp"
 
+#if __has_include("hardware_interface/types/hardware_component_interface_params.hpp")
+#include "hardware_interface/types/hardware_component_interface_params.hpp"
+#define VIRTUAL_AXES_HAS_INTERFACE_PARAMS 1
+#else
+#define VIRTUAL_AXES_HAS_INTERFACE_PARAMS 0
+#endif
+
 namespace virtual_axes_ros2_control
 {
+
+/// Argument of `on_init`. Newer releases of ros2_control pass parameters with the hardware block in them, and deprecate
+/// or lack the call with the block itself; older releases have that call alone.
+#if VIRTUAL_AXES_HAS_INTERFACE_PARAMS
+using InitParams = hardware_interface::HardwareComponentInterfaceParams;
+#else
+using InitParams = hardware_interface::HardwareInfo;
+#endif
 
 /// System with simulated feed drives: command interface position; state interfaces position, velocity, effort, current
 /// and following_error of each joint, in m, m/s, N and A, or rad, rad/s, N·m and A.
@@ -24,7 +39,7 @@ public:
   using hardware_interface::SystemInterface::on_init;
 
   /// Reads and checks the parameters machine, controller, joints and joint_prefix, and the interfaces of the joints.
-  hardware_interface::CallbackReturn on_init(const hardware_interface::HardwareInfo & info) override;
+  hardware_interface::CallbackReturn on_init(const InitParams & params) override;
 
   /// Creates the axes at rest at home.
   hardware_interface::CallbackReturn on_configure(const rclcpp_lifecycle::State & previous_state) override;

@@ -1,66 +1,74 @@
-/// Stand-in of hardware_interface::SystemInterface (ros2_control of ROS 2 Jazzy): the calls that the plugin makes.
+/// Stand-in of hardware_interface::SystemInterface: the calls that the plugin and its host make.
 #pragma once
 
 #include <cmath>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
+#include "hardware_interface/hardware_info.hpp"
 #include "hardware_interface/types/hardware_interface_return_values.hpp"
 #include "rclcpp/duration.hpp"
 #include "rclcpp/logging.hpp"
 #include "rclcpp/time.hpp"
+#include "rclcpp_lifecycle/node_interfaces/lifecycle_node_interface.hpp"
 #include "rclcpp_lifecycle/state.hpp"
+#if __has_include("hardware_interface/types/hardware_component_interface_params.hpp")
+#include "hardware_interface/types/hardware_component_interface_params.hpp"
+#define STANDIN_HAS_INTERFACE_PARAMS 1
+#else
+#define STANDIN_HAS_INTERFACE_PARAMS 0
+#endif
 
 namespace hardware_interface
 {
 
-enum class CallbackReturn { SUCCESS, FAILURE, ERROR };
+using CallbackReturn = rclcpp_lifecycle::node_interfaces::LifecycleNodeInterface::CallbackReturn;
 
-struct InterfaceInfo
-{
-  std::string name;
-};
-
-struct ComponentInfo
-{
-  std::string name;
-  std::vector<InterfaceInfo> command_interfaces;
-  std::vector<InterfaceInfo> state_interfaces;
-};
-
-struct HardwareInfo
-{
-  std::string name;
-  std::unordered_map<std::string, std::string> hardware_parameters;
-  std::vector<ComponentInfo> joints;
-};
-
-/// Base class with interfaces that are NaN until they are set, and unknown names that throw, as in ros2_control.
-class SystemInterface
+/// Base class whose interfaces exist once they are exported, are NaN until they are set, and throw for unknown names.
+class SystemInterface : public rclcpp_lifecycle::node_interfaces::LifecycleNodeInterface
 {
 public:
-  virtual ~SystemInterface() = default;
+  SystemInterface() = default;
+  SystemInterface(const SystemInterface &) = delete;
 
+#if STANDIN_HAS_INTERFACE_PARAMS
+  virtual CallbackReturn on_init(const HardwareComponentInterfaceParams & params)
+  {
+    info_ = params.hardware_info;
+    return CallbackReturn::SUCCESS;
+  }
+#else
   virtual CallbackReturn on_init(const HardwareInfo & info)
   {
     info_ = info;
-    for (const auto & joint : info.joints) {
-      for (const auto & interface : joint.state_interfaces) {
-        states_[joint.name + "/" + interface.name] = NAN;
-      }
-      for (const auto & interface : joint.command_interfaces) {
-        values_[joint.name + "/" + interface.name] = NAN;
-      }
-    }
     return CallbackReturn::SUCCESS;
   }
+#endif
 
-  virtual CallbackReturn on_configure(const rclcpp_lifecycle::State &) {return CallbackReturn::SUCCESS;}
-  virtual CallbackReturn on_cleanup(const rclcpp_lifecycle::State &) {return CallbackReturn::SUCCESS;}
-  virtual CallbackReturn on_activate(const rclcpp_lifecycle::State &) {return CallbackReturn::SUCCESS;}
-  virtual CallbackReturn on_deactivate(const rclcpp_lifecycle::State &) {return CallbackReturn::SUCCESS;}
+  virtual std::vector<std::shared_ptr<const double>> on_export_state_interfaces()
+  {
+    std::vector<std::shared_ptr<const double>> exported;
+    for (const auto & joint : joints()) {
+      for (const auto & interface : joint.state_interfaces) {
+        exported.push_back(states_[joint.name + "/" + interface.name] = std::make_shared<double>(NAN));
+      }
+    }
+    return exported;
+  }
+
+  virtual std::vector<std::shared_ptr<double>> on_export_command_interfaces()
+  {
+    std::vector<std::shared_ptr<double>> exported;
+    for (const auto & joint : joints()) {
+      for (const auto & interface : joint.command_interfaces) {
+        exported.push_back(commands_[joint.name + "/" + interface.name] = std::make_shared<double>(NAN));
+      }
+    }
+    return exported;
+  }
 
   virtual return_type prepare_command_mode_switch(
     const std::vector<std::string> &, const std::vector<std::string> &)
@@ -77,18 +85,24 @@ public:
   virtual return_type read(const rclcpp::Time & time, const rclcpp::Duration & period) = 0;
   virtual return_type write(const rclcpp::Time & time, const rclcpp::Duration & period) = 0;
 
-  void set_state(const std::string & name, double value) {states_.at(name) = value;}
-  double get_state(const std::string & name) const {return states_.at(name);}
-  void set_command(const std::string & name, double value) {values_.at(name) = value;}
-  double get_command(const std::string & name) const {return values_.at(name);}
-  rclcpp::Logger get_logger() const {return {};}
+  void set_state(const std::string & name, const double & value) {*states_.at(name) = value;}
+  double get_state(const std::string & name) const {return *states_.at(name);}
+  void set_command(const std::string & name, const double & value) {*commands_.at(name) = value;}
+  double get_command(const std::string & name) const {return *commands_.at(name);}
+  rclcpp::Logger get_logger() const {return rclcpp::get_logger(info_.name);}
+  const HardwareInfo & get_hardware_info() const {return info_;}
 
 protected:
   HardwareInfo info_;
 
 private:
-  std::unordered_map<std::string, double> states_;
-  std::unordered_map<std::string, double> values_;
+  using Values = std::unordered_map<std::string, std::shared_ptr<double>>;
+
+  /// Returns the joints of a system; a block of another type exports none.
+  std::vector<ComponentInfo> joints() const {return info_.type == "system" ? info_.joints : std::vector<ComponentInfo>();}
+
+  Values states_;
+  Values commands_;
 };
 
 }  // namespace hardware_interface

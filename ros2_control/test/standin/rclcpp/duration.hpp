@@ -1,13 +1,22 @@
 /// Stand-in of rclcpp::Duration.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 
 namespace rclcpp
 {
-struct Duration
+class Duration
 {
-  std::int64_t value;
-  std::int64_t nanoseconds() const {return value;}
+public:
+  explicit Duration(std::chrono::nanoseconds duration)
+  : value_(duration) {}
+
+  static Duration from_nanoseconds(std::int64_t nanoseconds) {return Duration(std::chrono::nanoseconds(nanoseconds));}
+
+  std::int64_t nanoseconds() const {return value_.count();}
+
+private:
+  std::chrono::nanoseconds value_;
 };
 }

@@ -5,8 +5,15 @@
 
 namespace rclcpp
 {
-struct Time
+class Time
 {
-  std::int64_t value;
+public:
+  explicit Time(std::int64_t nanoseconds = 0)
+  : value_(nanoseconds) {}
+
+  std::int64_t nanoseconds() const {return value_;}
+
+private:
+  std::int64_t value_;
 };
 }

@@ -3,7 +3,9 @@
 
 namespace rclcpp_lifecycle
 {
-struct State
+class State
 {
+public:
+  explicit State() {}
 };
 }
