@@ -246,13 +246,27 @@ impl<N: SimdReal> Transmission<N> {
         voltage: N,
         torque: N,
     ) -> (MotorState<N>, LoadState<N>) {
+        let (change, next) = self.change(motor, s, load, voltage, torque);
+        (MotorState { angle: s.angle + change.angle, ..change }, next)
+    }
+
+    /// Returns the state after [`step`](Self::step), with the change of θ over the tick in place of θ.
+    #[inline(always)]
+    fn change(
+        &self,
+        motor: &Motor<N>,
+        s: &MotorState<N>,
+        load: &LoadState<N>,
+        voltage: N,
+        torque: N,
+    ) -> (MotorState<N>, LoadState<N>) {
         let row = |row: &TransitionRow<N>, weights: &LoadWeights<N>| {
             row.apply_to(s, voltage, weights.add(load, row.torque * torque))
         };
         let state = MotorState {
             current: row(&motor.current, &self.current),
             speed: row(&motor.speed, &self.speed),
-            angle: s.angle + row(&motor.angle, &self.angle),
+            angle: row(&motor.angle, &self.angle),
         };
         let next = LoadState {
             wind_up: self.wind_up.apply(s, load, voltage, torque),
@@ -266,7 +280,8 @@ impl<N: SimdReal> Transmission<N> {
     ///
     /// `external` is load minus gravity, N·m at the motor. Friction is that of a rigid axis, a constant torque over the
     /// tick, with two exceptions, in which it would supply energy: a motor at rest at both ends of the tick is held over
-    /// the whole tick, and where the motor reverses within the tick, friction acts at its end.
+    /// the whole tick, and where the constant torque would act along the motion of the motor over the tick, friction acts
+    /// at its end. The work of a constant torque is the torque times the change of θ, so that energy never increases.
     #[inline(always)]
     pub(super) fn step_with_friction(
         &self,
@@ -275,13 +290,15 @@ impl<N: SimdReal> Transmission<N> {
         load: &mut LoadState<N>,
         [voltage, external, max_speed_drop]: [N; 3],
     ) -> N {
-        let (free, free_load) = self.step(motor, s, load, voltage, external);
-        let speed_drop = clamp_abs(free.speed, max_speed_drop);
+        let (change, free_load) = self.change(motor, s, load, voltage, external);
+        let speed_drop = clamp_abs(change.speed, max_speed_drop);
         let zero = speed_drop.splat(0.0);
         // 0 for a rigid axis, where the law has no exception.
         let is_elastic = zero.simd_lt(self.compliance);
-        let reverses = (s.speed * free.speed).select(is_elastic, zero).simd_lt(zero);
-        let constant = zero.select(reverses, speed_drop);
+        let work = motor.brake(&change, speed_drop).angle * speed_drop;
+        let acts_along_motion = work.select(is_elastic, zero).simd_lt(zero);
+        let constant = zero.select(acts_along_motion, speed_drop);
+        let free = MotorState { angle: s.angle + change.angle, ..change };
         let brake = |row: &LoadRow<N>, free: N| constant.mul_add(-row.per_speed, free);
         let sliding = motor.brake(&free, constant);
         let sliding = MotorState { speed: free.speed - speed_drop, ..sliding };
