@@ -284,6 +284,11 @@ impl<const L: usize> AxisBlock<L> {
         self.loads.resize_with(rows, || Aligned(LoadState::default().fill()));
     }
 
+    /// Returns true if an axis has a property that the paper's model leaves out.
+    fn is_extended(&self) -> bool {
+        self.has_elastic_axis
+    }
+
     /// Expands friction and gravity of a lane at its present speed and angle.
     fn expand(&mut self, lane: usize) {
         let (plant, motor, load) = (&self.loops.0.plant, &self.state.0.motor, &self.state.0.load);
@@ -340,9 +345,7 @@ impl<const L: usize> AxisBlock<L> {
         for index in 0..L / N::LANES {
             // With more of the three true, only the time differs.
             match (is_whole, self.has_tilting_axis) {
-                _ if self.has_elastic_axis => {
-                    self.run_chunk::<S, N, true, true, true>(simd, index, ticks, span)
-                }
+                _ if self.is_extended() => self.run_chunk::<S, N, true, true, true>(simd, index, ticks, span),
                 (true, false) => self.run_chunk::<S, N, false, false, false>(simd, index, ticks, span),
                 (true, true) => self.run_chunk::<S, N, true, false, false>(simd, index, ticks, span),
                 (false, _) => self.run_chunk::<S, N, true, true, false>(simd, index, ticks, span),
@@ -351,14 +354,14 @@ impl<const L: usize> AxisBlock<L> {
     }
 
     /// Runs the lanes `index`·`N::LANES` … (`index` + 1)·`N::LANES` − 1; see [`run`](Self::run). With `IS_PART` false,
-    /// the span is a whole position cycle.
+    /// the span is a whole position cycle; with `IS_EXTENDED` false, no axis has what the paper's model leaves out.
     #[inline(always)]
     fn run_chunk<
         S: Simd,
         N: SimdLoad<S>,
         const HAS_TILTING_AXIS: bool,
         const IS_PART: bool,
-        const HAS_ELASTIC_AXIS: bool,
+        const IS_EXTENDED: bool,
     >(
         &mut self,
         simd: S,
@@ -387,10 +390,9 @@ impl<const L: usize> AxisBlock<L> {
         } else {
             state.max_current_excess = zero;
             match HAS_TILTING_AXIS {
-                true => loops.plant.gravity_torque_with_expansion(
-                    &mut gravity_expansion,
-                    state.load_angle::<HAS_ELASTIC_AXIS>(),
-                ),
+                true => loops
+                    .plant
+                    .gravity_torque_with_expansion(&mut gravity_expansion, state.load_angle::<IS_EXTENDED>()),
                 false => loops.plant.weight_torque(),
             }
         };
@@ -418,14 +420,14 @@ impl<const L: usize> AxisBlock<L> {
                     .friction_speed_drop
                     .bound_with_expansion(&mut friction_expansion, state.motor.speed);
                 self.motors[tick].0.store(index, &state.motor);
-                if HAS_ELASTIC_AXIS {
+                if IS_EXTENDED && self.has_elastic_axis {
                     self.loads[tick].0.store(index, &state.load);
                 }
                 if tick > 0 && (record_all || HAS_TILTING_AXIS) {
                     state.friction = loops.plant.torque_from_speed_drop(speed_drop);
                     state.gravity = gravity;
                     if HAS_TILTING_AXIS {
-                        let angle = state.load_angle::<HAS_ELASTIC_AXIS>();
+                        let angle = state.load_angle::<IS_EXTENDED>();
                         gravity = loops.plant.gravity_torque_with_expansion(&mut gravity_expansion, angle);
                         external = inputs.load - gravity;
                     }
@@ -433,7 +435,7 @@ impl<const L: usize> AxisBlock<L> {
                 let (voltage, saturated) = loops.control_current(&mut state, excess);
                 saturated_ticks = (saturated_ticks + one).select(saturated, saturated_ticks);
                 let (motor, load) = (&mut state.motor, &mut state.load);
-                speed_drop = match HAS_ELASTIC_AXIS {
+                speed_drop = match IS_EXTENDED && self.has_elastic_axis {
                     true => loops.plant.step_elastic(motor, load, voltage, external, max_speed_drop),
                     false => loops.plant.step_with_torques(motor, voltage, external, max_speed_drop),
                 };
@@ -470,8 +472,8 @@ impl<const L: usize> AxisBlock<L> {
 impl<N: SimdReal> InnerLoopState<N> {
     /// Returns the angle of the load, rad of the motor.
     #[inline(always)]
-    fn load_angle<const HAS_ELASTIC_AXIS: bool>(&self) -> N {
-        if HAS_ELASTIC_AXIS { self.motor.angle - self.load.wind_up } else { self.motor.angle }
+    fn load_angle<const IS_EXTENDED: bool>(&self) -> N {
+        if IS_EXTENDED { self.motor.angle - self.load.wind_up } else { self.motor.angle }
     }
 }
 
