@@ -9,7 +9,8 @@ use super::layout::JointVariant;
 use super::machine::{
     AxisConfig, AxisKind, DelaysConfig, DeviationConfig, FeedforwardConfig, FrictionConfig, GpcConfig,
     GravityConfig, KinematicsConfig, LimitsConfig, MachineConfig, MotorConfig, Periods, PiConfig,
-    PositionControllerConfig, PositionFeedback, PositionLoopConfig, RstConfig, TransmissionConfig,
+    PositionControllerConfig, PositionFeedback, PositionLoopConfig, PreslidingConfig, RstConfig,
+    StribeckConfig, TransmissionConfig,
 };
 use super::parameters::Parameters;
 use super::value::Value;
@@ -94,6 +95,22 @@ pub(super) fn transmission_suffixes(axis: AxisKind) -> [&'static str; 3] {
     }
 }
 
+/// Returns the keys of stiffness and damping of the presliding, without the name of the axis.
+pub(super) fn presliding_suffixes(axis: AxisKind) -> [&'static str; 2] {
+    match axis {
+        AxisKind::Linear => ["friction.presliding_stiffness_n_um", "friction.presliding_damping_n_s_m"],
+        AxisKind::Rotary => ["friction.presliding_stiffness_nm_rad", "friction.presliding_damping_nm_s_rad"],
+    }
+}
+
+/// Returns the unit of a stiffness at an axis, N/m or N·m/rad.
+fn stiffness_unit(axis: AxisKind) -> f64 {
+    match axis {
+        AxisKind::Linear => NEWTON_PER_MICROMETER,
+        AxisKind::Rotary => 1.0,
+    }
+}
+
 /// Parameters of one axis.
 struct AxisParameters<'a> {
     set: &'a Parameters,
@@ -140,6 +157,15 @@ impl AxisParameters<'_> {
                 d: self.number("friction.d")?,
                 i0: self.number("friction.i0")?,
             },
+            stribeck: StribeckConfig {
+                current: self.number("friction.stribeck")?,
+                velocity: match self.joint.axis {
+                    AxisKind::Linear => self.number("friction.stribeck_velocity_m_min")?,
+                    AxisKind::Rotary => self.number("friction.stribeck_velocity_rpm")?,
+                },
+                viscous: self.number("friction.viscous")?,
+            },
+            presliding: self.presliding()?,
             gravity: GravityConfig {
                 weight: self.or_zero("gravity.weight_n"),
                 tilt: self.or_zero("gravity.tilt_nm"),
@@ -237,14 +263,20 @@ impl AxisParameters<'_> {
         let (Ok(stiffness), ratio) = (self.number(stiffness), self.transmission_ratio()?) else {
             return Ok(None);
         };
-        let unit = match self.joint.axis {
-            AxisKind::Linear => NEWTON_PER_MICROMETER,
-            AxisKind::Rotary => 1.0,
-        };
         Ok(Some(TransmissionConfig {
-            stiffness: stiffness * unit * ratio * ratio,
+            stiffness: stiffness * stiffness_unit(self.joint.axis) * ratio * ratio,
             damping: self.or_zero(damping) * ratio * ratio,
             load_inertia: self.number(load_inertia)? * ratio * ratio,
+        }))
+    }
+
+    /// Returns the presliding in units of the motor; `None` without a stiffness.
+    fn presliding(&self) -> Result<Option<PreslidingConfig>, ConfigError> {
+        let [stiffness, damping] = presliding_suffixes(self.joint.axis);
+        let (stiffness, ratio) = (self.or_zero(stiffness), self.transmission_ratio()?);
+        Ok((stiffness > 0.0).then(|| PreslidingConfig {
+            stiffness: stiffness * stiffness_unit(self.joint.axis) * ratio * ratio,
+            damping: self.or_zero(damping) * ratio * ratio,
         }))
     }
 

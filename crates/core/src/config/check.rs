@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 use std::f64::consts::TAU;
 
-use super::build::transmission_suffixes;
+use super::build::{presliding_suffixes, transmission_suffixes};
 use super::definition::{MotorKind, Presence};
 use super::error::{ConfigError, ValueSource};
 use super::layout::{JointVariant, ParameterLayout, joint_name_violation, plain_definition};
@@ -59,7 +59,7 @@ pub(super) fn check(
     for joint in &layout.joints {
         set.check_transmission(joint, origin)?;
         set.check_elasticity(joint, origin)?;
-        set.check_friction(joint)?;
+        set.check_friction(joint, origin)?;
         set.check_travel_limits(joint)?;
         set.check_horizons(joint)?;
         set.check_polynomials(joint)?;
@@ -316,7 +316,12 @@ impl CrossChecks<'_> {
         ))
     }
 
-    fn check_friction(&self, joint: &JointVariant) -> Result<(), ConfigError> {
+    fn check_friction(&self, joint: &JointVariant, origin: &ValueSource) -> Result<(), ConfigError> {
+        let [stiffness, damping] = presliding_suffixes(joint.axis).map(|key| format!("{}.{key}", joint.name));
+        let is_given = |key: &str| self.number(key).is_some_and(|value| value > 0.0);
+        if is_given(&damping) && !is_given(&stiffness) {
+            return Err(missing(origin, &stiffness, format!("expected it above 0 beside {damping}")));
+        }
         let a_key = format!("{}.friction.a", joint.name);
         let c_key = format!("{}.friction.c", joint.name);
         match (self.number(&a_key), self.number(&c_key)) {

@@ -77,6 +77,10 @@ pub struct AxisConfig {
     pub motor: MotorConfig,
     /// Friction law.
     pub friction: FrictionConfig,
+    /// Terms that are added to the friction law.
+    pub stribeck: StribeckConfig,
+    /// Presliding of the friction; `None` for friction without memory.
+    pub presliding: Option<PreslidingConfig>,
     /// Gravity load.
     pub gravity: GravityConfig,
     /// Position controller.
@@ -140,6 +144,27 @@ pub struct FrictionConfig {
     pub d: f64,
     /// Breakaway current i0, A.
     pub i0: f64,
+}
+
+/// Terms that are added to the double-exponential friction law: s·exp(−(V/Vs)²) + v·V (Stribeck curve and viscous
+/// friction; Armstrong-Hélouvry et al., Automatica 30, 1994).
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct StribeckConfig {
+    /// Amplitude s, A.
+    pub current: f64,
+    /// Stribeck velocity Vs, m/min or rev/min of the axis.
+    pub velocity: f64,
+    /// Viscous friction v, A/(m/min) or A/(rev/min) of the axis.
+    pub viscous: f64,
+}
+
+/// Presliding of the friction (LuGre model), in units of the motor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PreslidingConfig {
+    /// Stiffness σ0 of the bristles, N·m/rad (N/m for a linear motor).
+    pub stiffness: f64,
+    /// Damping σ1 of the bristles, N·m·s/rad (N·s/m for a linear motor).
+    pub damping: f64,
 }
 
 /// Gravity torque at the motor, r·(weight + tilt·sin(position + phase)).

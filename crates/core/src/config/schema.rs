@@ -233,6 +233,42 @@ const MACHINE: &[ParameterDefinition] = &[
     ParameterDefinition::number("friction.i0", "A", 0.0, MAX_CURRENT)
         .of_axis()
         .describe("Breakaway current i0, bound of the static friction (Prévost eq. 3)."),
+    ParameterDefinition::number("friction.stribeck", "A", 0.0, MAX_CURRENT)
+        .of_axis()
+        .default(Number(0.0))
+        .describe("Amplitude s of the Stribeck term s·exp(−(V/Vs)²), which is added to the friction law."),
+    ParameterDefinition::number("friction.stribeck_velocity_m_min", "m/min", 1e-6, 1e3)
+        .on(Linear)
+        .default(Number(0.1))
+        .describe("Velocity Vs of the Stribeck term."),
+    ParameterDefinition::number("friction.stribeck_velocity_rpm", "rpm", 1e-6, 1e3)
+        .on(Rotary)
+        .default(Number(0.1))
+        .describe("Velocity Vs of the Stribeck term, of the axis."),
+    ParameterDefinition::number("friction.viscous", "A/(m/min)", 0.0, MAX_CURRENT)
+        .on(Linear)
+        .default(Number(0.0))
+        .describe("Viscous friction v·V, which is added to the friction law."),
+    ParameterDefinition::number("friction.viscous", "A/rpm", 0.0, MAX_CURRENT)
+        .on(Rotary)
+        .default(Number(0.0))
+        .describe("Viscous friction v·V, which is added to the friction law, V in rev/min of the axis."),
+    ParameterDefinition::number("friction.presliding_stiffness_n_um", "N/µm", 0.0, 1e6)
+        .on(Linear)
+        .default(Number(0.0))
+        .describe("Stiffness σ0 of the friction before the axis slides (LuGre model), along the axis; 0: friction without presliding."),
+    ParameterDefinition::number("friction.presliding_stiffness_nm_rad", "N·m/rad", 0.0, 1e12)
+        .on(Rotary)
+        .default(Number(0.0))
+        .describe("Stiffness σ0 of the friction before the axis slides (LuGre model), at the axis; 0: friction without presliding."),
+    ParameterDefinition::number("friction.presliding_damping_n_s_m", "N/(m/s)", 0.0, 1e9)
+        .on(Linear)
+        .default(Number(0.0))
+        .describe("Damping σ1 of the friction before the axis slides (LuGre model), along the axis; needs a presliding stiffness."),
+    ParameterDefinition::number("friction.presliding_damping_nm_s_rad", "N·m/(rad/s)", 0.0, 1e9)
+        .on(Rotary)
+        .default(Number(0.0))
+        .describe("Damping σ1 of the friction before the axis slides (LuGre model), at the axis; needs a presliding stiffness."),
     // Gravity.
     ParameterDefinition::number("gravity.weight_n", "N", -1e6, 1e6)
         .on(Linear)

@@ -2,10 +2,12 @@
 
 use super::elementary::Exponential;
 use super::friction_expansion::{FrictionExpansion, SumOfExponentials};
-use crate::config::{AxisKind, FrictionConfig};
+use crate::config::{AxisConfig, AxisKind, FrictionConfig, StribeckConfig};
 use crate::simd::{SimdReal, soa_struct};
 use crate::units::{METER_PER_MINUTE, RPM};
 
+/// Motor speed up to which the Stribeck and viscous terms are evaluated, rad/s.
+const MAX_SPEED: f64 = 1e9;
 /// Velocity up to which the friction law was fitted, m/min or rev/min (Prévost eq. 3).
 const FITTED_RANGE: f64 = 20.0;
 
@@ -16,7 +18,7 @@ soa_struct! {
     /// i_f(V) = a e^{bV} + c e^{dV}  for V > 0, odd in V          |i_f(0)| ≤ i0          torque = Kt i_f
     /// ```
     ///
-    /// V is in m/min (linear axis) or rev/min (rotary axis).
+    /// V is in m/min (linear axis) or rev/min (rotary axis). `s e^{−(V/Vs)²} + v V` is added, if the axis has it.
     #[derive(Debug, Clone, Copy, PartialEq)]
     pub struct Friction {
         moving: SumOfExponentials<N>,
@@ -28,6 +30,20 @@ soa_struct! {
         constant_from_speed: N,
         /// Speed up to which the law was fitted, rad/s.
         fitted_range: N,
+        /// Kt s e^{−x}, with x = (ω/ωs)², N·m.
+        stribeck: Exponential<N>,
+        /// 1/ωs, s/rad.
+        per_stribeck_speed: N,
+        /// Kt v per speed of the motor, N·m·s/rad.
+        viscosity: N,
+    }
+}
+
+/// Returns the unit of V, m/s or rad/s of the axis.
+fn velocity_unit(kind: AxisKind) -> f64 {
+    match kind {
+        AxisKind::Linear => METER_PER_MINUTE,
+        AxisKind::Rotary => RPM,
     }
 }
 
@@ -36,12 +52,10 @@ impl Friction {
     ///
     /// With `torque_constant` Kt in N·m/A the friction is in N·m; another factor gives it in another unit per ampere.
     pub fn new(law: FrictionConfig, kind: AxisKind, transmission_ratio: f64, torque_constant: f64) -> Self {
-        let unit = match kind {
-            AxisKind::Linear => METER_PER_MINUTE,
-            AxisKind::Rotary => RPM,
-        };
+        let unit = velocity_unit(kind);
         // V per ω of the motor.
         let velocity = transmission_ratio / unit;
+        let none = Exponential::new(0.0, 0.0);
         let exponential = |size: f64, rate: f64| Exponential::new(torque_constant * size, rate * velocity);
         let moving = SumOfExponentials::new(exponential(law.a, law.b), exponential(law.c, law.d));
         Friction {
@@ -50,12 +64,38 @@ impl Friction {
             max_expanded_speed: moving.max_expanded_speed(),
             constant_from_speed: moving.constant_from_speed(),
             fitted_range: FITTED_RANGE / velocity,
+            stribeck: none,
+            per_stribeck_speed: 0.0,
+            viscosity: 0.0,
         }
+    }
+
+    /// Creates the friction law of an axis with its Stribeck and viscous terms; see [`new`](Self::new).
+    pub fn of_axis(axis: &AxisConfig, torque_constant: f64) -> Self {
+        let (r, StribeckConfig { current, velocity, viscous }) = (axis.transmission_ratio, axis.stribeck);
+        let unit = velocity_unit(axis.kind);
+        Friction {
+            stribeck: Exponential::new(torque_constant * current, -1.0),
+            per_stribeck_speed: r / (velocity * unit),
+            viscosity: torque_constant * viscous * r / unit,
+            ..Friction::new(axis.friction, axis.kind, r, torque_constant)
+        }
+    }
+
+    /// Returns the law without its viscous term, and the coefficient of that term, N·m·s/rad.
+    pub fn without_viscosity(self) -> (Self, f64) {
+        (Friction { viscosity: 0.0, ..self }, self.viscosity)
+    }
+
+    /// Returns true if the law has a Stribeck or viscous term.
+    pub fn has_stribeck_terms(&self) -> bool {
+        self.viscosity > 0.0 || self.stribeck.at(0.0) > 0.0
     }
 
     /// Returns the largest friction torque at motor speed ω (rad/s), N·m; it is not negative.
     pub fn bound(&self, speed: f64) -> f64 {
-        self.limit_to_resisting(speed, self.moving.at(speed.abs().min(self.constant_from_speed)))
+        let moving = self.moving.at(speed.abs().min(self.constant_from_speed));
+        self.limit_to_resisting(speed, moving + self.stribeck_terms(speed))
     }
 
     /// Returns true if the law is extrapolated at motor speed ω (rad/s).
@@ -77,6 +117,29 @@ impl<N: SimdReal> Friction<N> {
     /// Renews the expansion in the lanes whose speed is out of its range, and only there.
     #[inline(always)]
     pub(crate) fn bound_with_expansion(&self, expansion: &mut FrictionExpansion<N>, speed: N) -> N {
+        let moving = self.expanded(expansion, speed);
+        self.limit_to_resisting(speed, moving)
+    }
+
+    /// Returns the largest friction torque with the Stribeck and viscous terms; see
+    /// [`bound_with_expansion`](Self::bound_with_expansion).
+    #[inline(always)]
+    pub(crate) fn bound_with_stribeck_terms(&self, expansion: &mut FrictionExpansion<N>, speed: N) -> N {
+        let moving = self.expanded(expansion, speed);
+        self.limit_to_resisting(speed, moving + self.stribeck_terms(speed))
+    }
+
+    /// Returns the Stribeck and viscous terms at motor speed ω (rad/s), N·m.
+    #[inline(always)]
+    fn stribeck_terms(&self, speed: N) -> N {
+        let size = speed.abs().min(speed.splat(MAX_SPEED));
+        let ratio = size * self.per_stribeck_speed;
+        self.viscosity.mul_add(size, self.stribeck.at(ratio * ratio))
+    }
+
+    /// Returns the two exponentials at motor speed ω (rad/s) from `expansion`, N·m.
+    #[inline(always)]
+    fn expanded(&self, expansion: &mut FrictionExpansion<N>, speed: N) -> N {
         let size = speed.abs();
         let mut distance = self.moving.distance(expansion, size);
         if FrictionExpansion::any_out_of_range(distance) {
@@ -84,7 +147,7 @@ impl<N: SimdReal> Friction<N> {
             *expansion = next.select(FrictionExpansion::out_of_range(distance), *expansion);
             distance = FrictionExpansion::clamp_to_range(self.moving.distance(expansion, size));
         }
-        self.limit_to_resisting(speed, expansion.at(distance))
+        expansion.at(distance)
     }
 
     /// Returns the friction torque bound at motor speed ω (rad/s): breakaway at ω = 0; a negative bound is set to 0.

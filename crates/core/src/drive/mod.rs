@@ -14,6 +14,7 @@ mod friction_expansion;
 mod gravity;
 mod motor;
 mod plant;
+mod presliding;
 mod response;
 mod transmission;
 
@@ -23,6 +24,7 @@ pub use gravity::Gravity;
 pub(crate) use gravity::GravityExpansion;
 pub use motor::{Motor, MotorState};
 pub use plant::{Plant, Torques};
+pub use presliding::Presliding;
 pub use transmission::{LoadState, Transmission};
 
 use crate::units::Rounded;

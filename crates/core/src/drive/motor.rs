@@ -49,6 +49,8 @@ soa_struct! {
         current_per_speed: N,
         /// Change of θ by a torque that changes ω by 1 rad/s over one tick, rad/(rad/s).
         angle_per_speed: N,
+        /// Change of ω by a torque that changes θ by 1 rad over one tick, (rad/s)/rad.
+        speed_per_angle: N,
     }
 }
 
@@ -164,12 +166,18 @@ impl Motor {
             torque_per_speed,
             current_per_speed: friction[0] * torque_per_speed,
             angle_per_speed: friction[2] * torque_per_speed,
+            speed_per_angle: friction[1] / friction[2],
         }
     }
 
     /// Returns the change of ω over one tick per torque at the motor, (rad/s)/(N·m).
     pub(super) fn speed_per_torque(&self) -> f64 {
         self.speed_per_torque
+    }
+
+    /// Returns the change of θ over one tick per torque at the motor, rad/(N·m).
+    pub(super) fn angle_per_torque(&self) -> f64 {
+        self.speed_per_torque * self.angle_per_speed
     }
 }
 
@@ -210,6 +218,24 @@ impl<N: SimdReal> Motor<N> {
             speed: free.speed - speed_drop,
             angle: speed_drop.mul_add(-self.angle_per_speed, free.angle),
         }
+    }
+
+    /// Returns the change of θ over a tick for a held `voltage` (V) and `torque` (N·m), rad.
+    #[inline(always)]
+    pub(super) fn displacement(&self, s: &MotorState<N>, voltage: N, torque: N) -> N {
+        self.angle.apply(s, voltage, torque)
+    }
+
+    /// Returns the displacement (rad) by the torque of a speed drop over one tick (rad/s).
+    #[inline(always)]
+    pub(super) fn displacement_by_speed_drop(&self, speed_drop: N) -> N {
+        speed_drop * self.angle_per_speed
+    }
+
+    /// Returns the speed drop over one tick (rad/s) by the torque of a displacement (rad).
+    #[inline(always)]
+    pub(super) fn speed_drop_by_displacement(&self, displacement: N) -> N {
+        displacement * self.speed_per_angle
     }
 
     /// Returns the friction torque for a speed drop over one tick (rad/s), N·m.

@@ -1,8 +1,10 @@
 //! Plant of one axis: motor, friction, gravity and load.
 
-use super::{DriveError, Friction, Gravity, GravityExpansion, LoadState, Motor, MotorState, Transmission};
-use crate::config::{AxisConfig, MotorConfig, TransmissionConfig};
-use crate::simd::{SimdReal, soa_struct};
+use super::{
+    DriveError, Friction, Gravity, GravityExpansion, LoadState, Motor, MotorState, Presliding, Transmission,
+};
+use crate::config::{AxisConfig, MotorConfig, PreslidingConfig, TransmissionConfig};
+use crate::simd::{SimdReal, clamp_abs, soa_struct};
 
 /// Torques over one tick, N·m at the motor (N for a linear motor).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -22,6 +24,7 @@ soa_struct! {
         pub(crate) motor: Motor<N>,
         /// Friction law scaled to the speed change per tick, rad/s.
         pub(crate) friction_speed_drop: Friction<N>,
+        pub(crate) presliding: Presliding<N>,
         pub(crate) gravity: Gravity<N>,
         pub(crate) transmission: Transmission<N>,
         transmission_ratio: N,
@@ -44,9 +47,23 @@ impl Plant {
             Some(elastic) => Transmission::new(&motor, &elastic, period)?,
             None => (Motor::new(&motor, period)?, Transmission::rigid()),
         };
-        let friction_speed_drop = friction_constant * discretized.speed_per_torque();
+        let speed_per_torque = discretized.speed_per_torque();
+        let friction = Friction::of_axis(axis, friction_constant * speed_per_torque);
+        let (friction_speed_drop, presliding) = match &axis.presliding {
+            Some(presliding) => {
+                let (law, viscosity) = friction.without_viscosity();
+                let per_torque = discretized.angle_per_torque();
+                let scaled = PreslidingConfig {
+                    stiffness: presliding.stiffness * deviation.friction,
+                    damping: presliding.damping * deviation.friction,
+                };
+                (law, Presliding::new(&scaled, viscosity / speed_per_torque, period, per_torque))
+            }
+            None => (friction, Presliding::none()),
+        };
         Ok(Plant {
-            friction_speed_drop: Friction::new(axis.friction, axis.kind, r, friction_speed_drop),
+            friction_speed_drop,
+            presliding,
             gravity: Gravity::new(&axis.gravity, r),
             transmission,
             transmission_ratio: r,
@@ -79,19 +96,24 @@ impl Plant {
         self.friction_speed_drop.is_extrapolated(speed)
     }
 
-    /// Steps a plant with an elastic transmission by one tick, as [`step`](Self::step) a rigid one: friction acts at the
-    /// motor, gravity and `load` at the load.
+    /// Steps any plant by one tick, as [`step`](Self::step) a rigid one without presliding: friction acts at the motor,
+    /// gravity and `load` at the load. `deflection` is that of the bristles, rad at the motor; 0 without presliding.
     pub fn step_with_load(
         &self,
         s: &mut MotorState,
         load_state: &mut LoadState,
+        deflection: &mut f64,
         voltage: f64,
         load: f64,
     ) -> Torques {
         let gravity = self.gravity_torque(s.angle - load_state.wind_up);
         let load = self.load_torque(load);
-        let bound = self.friction_speed_drop.bound(s.speed);
-        let speed_drop = self.step_elastic(s, load_state, voltage, load - gravity, bound);
+        let inputs = [voltage, load - gravity, self.friction_speed_drop.bound(s.speed)];
+        let deflection = self.presliding.is_present().then_some(deflection);
+        let speed_drop = match self.transmission.is_elastic() {
+            true => self.step_elastic(s, load_state, deflection, inputs),
+            false => self.step_rigid(s, deflection, inputs),
+        };
         Torques { friction: self.torque_from_speed_drop(speed_drop), gravity, load }
     }
 
@@ -176,18 +198,62 @@ impl<N: SimdReal> Plant<N> {
         speed_drop
     }
 
-    /// Steps motor and load by one tick with known torques, the load in place of the motor under `external`; see
-    /// [`step_with_torques`](Self::step_with_torques).
+    /// Steps a rigid plant by one tick under a voltage, a torque and a bound of friction, as
+    /// [`step_with_torques`](Self::step_with_torques), with presliding if there is a `deflection`.
+    #[inline(always)]
+    pub(crate) fn step_rigid(
+        &self,
+        s: &mut MotorState<N>,
+        deflection: Option<&mut N>,
+        [voltage, external, max_speed_drop]: [N; 3],
+    ) -> N {
+        let free = self.motor.step(s, voltage, external);
+        let stopping = clamp_abs(free.speed, max_speed_drop);
+        let speed_drop = match deflection {
+            None => stopping,
+            Some(deflection) => {
+                let displacement = self.motor.displacement(s, voltage, external);
+                self.sliding(displacement, max_speed_drop, deflection, stopping)
+            }
+        };
+        *s = self.motor.brake(&free, speed_drop);
+        speed_drop
+    }
+
+    /// Steps motor and load by one tick, the load in place of the motor under the torque; see
+    /// [`step_rigid`](Self::step_rigid).
     #[inline(always)]
     pub(crate) fn step_elastic(
         &self,
         s: &mut MotorState<N>,
         load: &mut LoadState<N>,
-        voltage: N,
-        external: N,
-        max_speed_drop: N,
+        deflection: Option<&mut N>,
+        [voltage, external, max_speed_drop]: [N; 3],
     ) -> N {
-        self.transmission.step_with_friction(&self.motor, s, load, [voltage, external, max_speed_drop])
+        let presliding = match deflection {
+            Some(_) => self.presliding.stiffness,
+            None => voltage.splat(0.0),
+        };
+        let friction = |free: &MotorState<N>| {
+            let stopping = clamp_abs(free.speed, max_speed_drop);
+            match deflection {
+                None => stopping,
+                Some(deflection) => self.sliding(free.angle, max_speed_drop, deflection, stopping),
+            }
+        };
+        let inputs = [voltage, external, presliding];
+        self.transmission.step_with_friction(&self.motor, s, load, inputs, friction)
+    }
+
+    /// Returns the speed drop by friction with presliding over a tick (rad/s) from the displacement without friction
+    /// (rad), and changes the deflection; the speed drop is `stopping` in the lanes without presliding.
+    #[inline(always)]
+    fn sliding(&self, displacement: N, max_speed_drop: N, deflection: &mut N, stopping: N) -> N {
+        let law = self.motor.displacement_by_speed_drop(max_speed_drop);
+        let (by_friction, next) = self.presliding.step(displacement, law, *deflection);
+        let is_present = law.splat(0.0).simd_lt(self.presliding.stiffness);
+        *deflection = next.select(is_present, *deflection);
+        self.motor.speed_drop_by_displacement(by_friction).select(is_present, stopping)
     }
 
     /// Returns the friction torque for a speed drop over one tick (rad/s), N·m.

@@ -15,7 +15,7 @@ use nalgebra::SMatrix;
 use super::DriveError;
 use super::motor::{Motor, MotorState, TransitionRow};
 use crate::config::{MotorConfig, TransmissionConfig};
-use crate::simd::{SimdReal, clamp_abs, soa_struct};
+use crate::simd::{SimdReal, soa_struct};
 
 /// Order of the augmented system: states i, ω, δ, ω_load, θ, then the held inputs u, τ at the motor and τ at the load.
 const ORDER: usize = 8;
@@ -282,21 +282,26 @@ impl<N: SimdReal> Transmission<N> {
     /// tick, with two exceptions, in which it would supply energy: a motor at rest at both ends of the tick is held over
     /// the whole tick, and where the constant torque would act along the motion of the motor over the tick, friction acts
     /// at its end. The work of a constant torque is the torque times the change of θ, so that energy never increases.
+    ///
+    /// `friction` returns the speed drop (rad/s) from the state without friction, with the change of θ. A lane has no exceptions where
+    /// `presliding`, the stiffness of the bristles, is above 0.
     #[inline(always)]
     pub(super) fn step_with_friction(
         &self,
         motor: &Motor<N>,
         s: &mut MotorState<N>,
         load: &mut LoadState<N>,
-        [voltage, external, max_speed_drop]: [N; 3],
+        [voltage, external, presliding]: [N; 3],
+        friction: impl FnOnce(&MotorState<N>) -> N,
     ) -> N {
         let (change, free_load) = self.change(motor, s, load, voltage, external);
-        let speed_drop = clamp_abs(change.speed, max_speed_drop);
+        let speed_drop = friction(&change);
         let zero = speed_drop.splat(0.0);
-        // 0 for a rigid axis, where the law has no exception.
-        let is_elastic = zero.simd_lt(self.compliance);
+        // A rigid axis has no compliance, and the law no exception.
+        let exceptions = zero.select(zero.simd_lt(presliding), self.compliance);
+        let has_exceptions = zero.simd_lt(exceptions);
         let work = motor.brake(&change, speed_drop).angle * speed_drop;
-        let acts_along_motion = work.select(is_elastic, zero).simd_lt(zero);
+        let acts_along_motion = work.select(has_exceptions, zero).simd_lt(zero);
         let constant = zero.select(acts_along_motion, speed_drop);
         let free = MotorState { angle: s.angle + change.angle, ..change };
         let brake = |row: &LoadRow<N>, free: N| constant.mul_add(-row.per_speed, free);
@@ -308,7 +313,7 @@ impl<N: SimdReal> Transmission<N> {
         };
         // The motor is at rest at both ends.
         let is_held = (s.speed.abs() + sliding.speed.abs())
-            .simd_lt(zero.splat(f64::MIN_POSITIVE).select(is_elastic, zero));
+            .simd_lt(zero.splat(f64::MIN_POSITIVE).select(has_exceptions, zero));
         let held = &self.held;
         let hold = |row: &HeldRow<N>| row.load.add(load, row.torque * external);
         let held_motor = MotorState {

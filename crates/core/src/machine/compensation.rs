@@ -30,7 +30,7 @@ impl FrictionCompensation {
     pub fn new(axis: &AxisConfig, periods: &Periods, delay: u64) -> Option<Self> {
         let (r, weight) = (axis.transmission_ratio, axis.feedforward.friction);
         (weight != 0.0).then(|| FrictionCompensation {
-            friction: Friction::new(axis.friction, axis.kind, r, axis.motor.torque_constant),
+            friction: Friction::of_axis(axis, axis.motor.torque_constant),
             speed_per_step: 1.0 / seconds(periods.position) / r,
             weight,
             delay,

@@ -29,6 +29,8 @@ soa_struct! {
     pub(super) struct InnerLoopState {
         pub motor: MotorState<N>,
         pub load: LoadState<N>,
+        /// Deflection of the bristles of friction, rad of the motor; 0 without presliding.
+        pub deflection: N,
         pub velocity: PiState<N>,
         pub current: PiState<N>,
         /// i*, A.
@@ -190,6 +192,10 @@ pub(super) struct AxisBlock<const L: usize> {
     has_tilting_axis: bool,
     /// True if the transmission of any axis is elastic.
     has_elastic_axis: bool,
+    /// True if the friction of any axis has presliding.
+    has_presliding: bool,
+    /// True if the friction law of any axis has a Stribeck or viscous term.
+    has_stribeck_terms: bool,
     /// Friction compensation of each velocity cycle, N·m at the motor; empty without compensation.
     compensation: Vec<Aligned<[f64; L]>>,
     /// Motor states at the start of each tick.
@@ -213,6 +219,8 @@ impl<const L: usize> AxisBlock<L> {
             span_state: Aligned(SpanState::default().fill()),
             has_tilting_axis: loops.plant.gravity.is_position_dependent(),
             has_elastic_axis: false,
+            has_presliding: false,
+            has_stribeck_terms: false,
             compensation: Vec::new(),
             motors: vec![Aligned(MotorState::default().fill()); ticks.position],
             loads: Vec::new(),
@@ -280,13 +288,15 @@ impl<const L: usize> AxisBlock<L> {
         let any = |is: fn(&Plant) -> bool| (0..L).any(|lane| is(&self.loops.0.lane(lane).plant));
         self.has_tilting_axis = any(|plant| plant.gravity.is_position_dependent());
         self.has_elastic_axis = any(|plant| plant.transmission.is_elastic());
+        self.has_presliding = any(|plant| plant.presliding.is_present());
+        self.has_stribeck_terms = any(|plant| plant.friction_speed_drop.has_stribeck_terms());
         let rows = if self.has_elastic_axis { self.motors.len() } else { 0 };
         self.loads.resize_with(rows, || Aligned(LoadState::default().fill()));
     }
 
     /// Returns true if an axis has a property that the paper's model leaves out.
     fn is_extended(&self) -> bool {
-        self.has_elastic_axis
+        self.has_elastic_axis || self.has_presliding || self.has_stribeck_terms
     }
 
     /// Expands friction and gravity of a lane at its present speed and angle.
@@ -415,10 +425,11 @@ impl<const L: usize> AxisBlock<L> {
                 excess = loops.control_velocity(&inputs, &mut state, velocity_cycle as f64, compensation);
             }
             for tick in first..end {
-                let max_speed_drop = loops
-                    .plant
-                    .friction_speed_drop
-                    .bound_with_expansion(&mut friction_expansion, state.motor.speed);
+                let (law, speed) = (&loops.plant.friction_speed_drop, state.motor.speed);
+                let max_speed_drop = match IS_EXTENDED && self.has_stribeck_terms {
+                    true => law.bound_with_stribeck_terms(&mut friction_expansion, speed),
+                    false => law.bound_with_expansion(&mut friction_expansion, speed),
+                };
                 self.motors[tick].0.store(index, &state.motor);
                 if IS_EXTENDED && self.has_elastic_axis {
                     self.loads[tick].0.store(index, &state.load);
@@ -435,9 +446,15 @@ impl<const L: usize> AxisBlock<L> {
                 let (voltage, saturated) = loops.control_current(&mut state, excess);
                 saturated_ticks = (saturated_ticks + one).select(saturated, saturated_ticks);
                 let (motor, load) = (&mut state.motor, &mut state.load);
-                speed_drop = match IS_EXTENDED && self.has_elastic_axis {
-                    true => loops.plant.step_elastic(motor, load, voltage, external, max_speed_drop),
-                    false => loops.plant.step_with_torques(motor, voltage, external, max_speed_drop),
+                let torques = [voltage, external, max_speed_drop];
+                speed_drop = if IS_EXTENDED {
+                    let deflection = self.has_presliding.then_some(&mut state.deflection);
+                    match self.has_elastic_axis {
+                        true => loops.plant.step_elastic(motor, load, deflection, torques),
+                        false => loops.plant.step_rigid(motor, deflection, torques),
+                    }
+                } else {
+                    loops.plant.step_with_torques(motor, voltage, external, max_speed_drop)
                 };
                 if record_all || tick == 0 {
                     let InnerLoopState { current_setpoint, friction, gravity, .. } = state;

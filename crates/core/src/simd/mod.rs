@@ -11,7 +11,7 @@ mod unroll;
 mod vector;
 
 use std::fmt::Debug;
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 pub use dispatch::{SliceOperation, vectorize};
 pub(crate) use soa::soa_struct;
@@ -20,7 +20,13 @@ pub use vector::{SimdLoad, Vector};
 
 /// Real number type of the drive model: scalar or SIMD vector.
 pub trait SimdReal:
-    Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+    Copy
+    + Debug
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
 {
     /// Result of a comparison, per lane.
     type Mask: Copy;
@@ -33,6 +39,9 @@ pub trait SimdReal:
 
     /// Returns the absolute value.
     fn abs(self) -> Self;
+
+    /// Returns the square root.
+    fn sqrt(self) -> Self;
 
     /// Returns `self` where it is smaller than `other`, else `other`, including where one of them is NaN.
     fn min(self, other: Self) -> Self;
@@ -76,6 +85,11 @@ impl SimdReal for f64 {
     #[inline(always)]
     fn abs(self) -> f64 {
         f64::abs(self)
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> f64 {
+        f64::sqrt(self)
     }
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! Two-fold unrolling: two scalars or two vectors behind one [`SimdReal`].
 
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use pulp::Simd;
 
@@ -37,6 +37,15 @@ impl<N: SimdReal> Mul for Unroll2<N> {
     }
 }
 
+impl<N: SimdReal> Div for Unroll2<N> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Unroll2(self.0 / other.0, self.1 / other.1)
+    }
+}
+
 impl<N: SimdReal> Neg for Unroll2<N> {
     type Output = Self;
 
@@ -62,6 +71,11 @@ impl<N: SimdReal> SimdReal for Unroll2<N> {
     #[inline(always)]
     fn abs(self) -> Self {
         Unroll2(self.0.abs(), self.1.abs())
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Unroll2(self.0.sqrt(), self.1.sqrt())
     }
 
     #[inline(always)]

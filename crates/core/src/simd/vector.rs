@@ -1,6 +1,6 @@
 //! SIMD vector of f64 with the width of the selected instruction set.
 
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use pulp::Simd;
 
@@ -82,6 +82,15 @@ impl<S: Simd> Mul for Vector<S> {
     }
 }
 
+impl<S: Simd> Div for Vector<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.with(self.simd.div_f64s(self.value, other.value))
+    }
+}
+
 impl<S: Simd> Neg for Vector<S> {
     type Output = Self;
 
@@ -107,6 +116,11 @@ impl<S: Simd> SimdReal for Vector<S> {
     #[inline(always)]
     fn abs(self) -> Self {
         self.with(self.simd.abs_f64s(self.value))
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.with(self.simd.sqrt_f64s(self.value))
     }
 
     #[inline(always)]

@@ -5,6 +5,7 @@ mod drives;
 mod friction;
 mod parameter_ranges;
 mod partial_cycles;
+mod presliding;
 mod scalar_c;
 mod simd;
 mod stored_states;

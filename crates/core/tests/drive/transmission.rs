@@ -16,7 +16,7 @@ use crate::parameter_ranges::{golden, run_demanding_setpoints};
 
 const X: usize = 0;
 /// X with a table of 1200 kg behind 200 N/µm: antiresonance 65 Hz, resonance 86 Hz.
-const ELASTIC_X: [&str; 3] = [
+pub const ELASTIC_X: [&str; 3] = [
     "x.transmission.stiffness_n_um=200",
     "x.transmission.damping_n_s_m=15000",
     "x.transmission.load_mass_kg=1200",
@@ -174,7 +174,7 @@ fn friction_and_load_are_those_of_a_small_step_integration() {
     let force = 5000.0;
     for n in 0..400 {
         let voltage = 30.0 + 40.0 * (0.03 * f64::from(n)).sin();
-        plant.step_with_load(&mut motor, &mut load, voltage, force);
+        plant.step_with_load(&mut motor, &mut load, &mut 0.0, voltage, force);
         let outer = force * axis.transmission_ratio;
         exact = runge_kutta(&axis.motor, &elastic, exact, [voltage, torque, outer], tick);
         assert!(exact[1] > 1.0, "the motor does not reverse");
@@ -238,7 +238,7 @@ proptest! {
             let first = energy(&motor, &load);
             let mut before = first;
             for tick in 0..100 {
-                plant.step_with_load(&mut motor, &mut load, 0.0, 0.0);
+                plant.step_with_load(&mut motor, &mut load, &mut 0.0, 0.0, 0.0);
                 let now = energy(&motor, &load);
                 prop_assert!(now <= before + 1e-13 * first, "{now} after {before}, tick {tick}, {start:?}");
                 before = now;
@@ -292,12 +292,12 @@ proptest! {
 }
 
 /// Setpoints of all axes in a position cycle.
-fn psec(k: usize) -> [f64; AXES] {
+pub fn psec(k: usize) -> [f64; AXES] {
     std::array::from_fn(|axis| 0.02 * (1.0 - (9.0 * TSP * k as f64 + axis as f64).cos()))
 }
 
 /// Returns the bits of position, velocity, current and wind-up of an axis over all ticks of a motion.
-fn bits(config: &MachineConfig, axis: usize, width: SimdWidth, parts: &[usize]) -> Vec<u64> {
+pub fn bits(config: &MachineConfig, axis: usize, width: SimdWidth, parts: &[usize]) -> Vec<u64> {
     let mut machine = Machine::new(Arc::new(MachineParameters::new(config).expect("can be discretized")));
     machine.set_simd_width(width);
     let mut bits = Vec::new();

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use virtual_axes_core::config::{
     AxisConfig, AxisKind, DelaysConfig, DeviationConfig, FeedforwardConfig, FrictionConfig, GravityConfig,
     LimitsConfig, MotorConfig, Periods, PiConfig, PositionControllerConfig, PositionFeedback,
-    PositionLoopConfig,
+    PositionLoopConfig, StribeckConfig,
 };
 use virtual_axes_core::units::{
     METER_PER_MINUTE, MICROSECOND_NS, MILLIMETER, MILLISECOND_NS, Nanoseconds, POSITION_GAIN,
@@ -136,6 +136,8 @@ pub(super) fn draw_axis(
         name: name.to_owned(),
         kind: AxisKind::Linear,
         transmission: None,
+        stribeck: StribeckConfig::default(),
+        presliding: None,
         transmission_ratio: mechanics.ratio,
         motor,
         friction,
