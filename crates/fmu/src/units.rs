@@ -20,6 +20,8 @@ pub(crate) fn base_unit(name: &str) -> Option<&'static str> {
         "min/rev" => r#"rad="-1" s="1" factor="9.549296585513721""#,
         "(m/min)/mm" | "(1000 °/min)/°" => r#"s="-1" factor="16.666666666666668""#,
         "A" => r#"A="1""#,
+        "A/(m/min)" => r#"A="1" m="-1" s="1" factor="60""#,
+        "A/rpm" => r#"A="1" rad="-1" s="1" factor="9.549296585513721""#,
         "V" => r#"kg="1" m="2" s="-3" A="-1""#,
         "Ω" | "V/A" => r#"kg="1" m="2" s="-3" A="-2""#,
         "mH" => r#"kg="1" m="2" s="-2" A="-2" factor="0.001""#,

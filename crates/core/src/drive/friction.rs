@@ -82,9 +82,10 @@ impl Friction {
         }
     }
 
-    /// Returns the law without its viscous term, and the coefficient of that term, N·m·s/rad.
-    pub fn without_viscosity(self) -> (Self, f64) {
-        (Friction { viscosity: 0.0, ..self }, self.viscosity)
+    /// Returns the law of presliding, without viscous term and breakaway, and the coefficient of that term, N·m·s/rad.
+    pub fn of_presliding(self) -> (Self, f64) {
+        let at_rest = self.moving.at(0.0) + self.stribeck.at(0.0);
+        (Friction { viscosity: 0.0, breakaway: at_rest.max(0.0), ..self }, self.viscosity)
     }
 
     /// Returns true if the law has a Stribeck or viscous term.

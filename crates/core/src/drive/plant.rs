@@ -51,7 +51,7 @@ impl Plant {
         let friction = Friction::of_axis(axis, friction_constant * speed_per_torque);
         let (friction_speed_drop, presliding) = match &axis.presliding {
             Some(presliding) => {
-                let (law, viscosity) = friction.without_viscosity();
+                let (law, viscosity) = friction.of_presliding();
                 let per_torque = discretized.angle_per_torque();
                 let scaled = PreslidingConfig {
                     stiffness: presliding.stiffness * deviation.friction,

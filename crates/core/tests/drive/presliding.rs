@@ -119,7 +119,7 @@ fn published_axis() -> AxisConfig {
 fn published_errors(case: f64, period: f64, force: impl Fn(f64, f64) -> f64) -> [f64; 2] {
     // Displacement of a mass of 1 kg by a force of 1 N over a tick.
     let per_force = period * period / 2.0;
-    let (law, viscosity) = Friction::of_axis(&published_axis(), 1.0).without_viscosity();
+    let (law, viscosity) = Friction::of_axis(&published_axis(), 1.0).of_presliding();
     let config = PreslidingConfig { stiffness: 1e5, damping: 1e5_f64.sqrt() };
     let bristles = Presliding::new(&config, viscosity, period, per_force);
     let (mut position, mut speed, mut deflection, mut step) = (0.0, 0.0, 0.0, 0);

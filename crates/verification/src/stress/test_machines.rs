@@ -32,16 +32,20 @@ pub enum TestMachinesError {
     /// A machine cannot be simulated.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// An axis has an elastic transmission, which the independent checks do not contain.
+    /// An axis has a property that the independent checks do not contain.
     #[error(
-        "{machine}: axis {axis} has an elastic transmission, the checks of the stress test are those of rigid axes; \
-         remove transmission.stiffness and transmission.load"
+        "{machine}: axis {axis} has {property}, the checks of the stress test are those of the paper's model; \
+         remove the parameters {keys}"
     )]
-    Elastic {
+    Extended {
         /// Name of the machine.
         machine: String,
         /// Name of the axis.
         axis: String,
+        /// Property, as a noun phrase.
+        property: &'static str,
+        /// Parameters that it comes from.
+        keys: &'static str,
     },
     /// The position cycle of a machine has too many ticks.
     #[error(
@@ -198,12 +202,27 @@ pub struct TestMachines {
     variants: Arc<[MachineVariant]>,
 }
 
+/// Rejects an axis with a property that the independent checks do not contain.
+fn reject_extended(machine: &str, axis: &AxisConfig) -> Result<(), TestMachinesError> {
+    let has_terms = axis.stribeck.current > 0.0 || axis.stribeck.viscous > 0.0;
+    let (property, keys) = match axis {
+        _ if axis.transmission.is_some() => {
+            ("an elastic transmission", "transmission.stiffness and transmission.load")
+        }
+        _ if axis.presliding.is_some() => ("friction with presliding", "friction.presliding"),
+        _ if has_terms => ("Stribeck or viscous friction", "friction.stribeck and friction.viscous"),
+        _ => return Ok(()),
+    };
+    let (machine, axis) = (machine.to_owned(), axis.name().to_owned());
+    Err(TestMachinesError::Extended { machine, axis, property, keys })
+}
+
 impl TestMachines {
     /// Creates all variants of `machines`.
     ///
     /// # Errors
-    /// [`TestMachinesError`] if the list is empty, or if a machine rejects a controller, has an elastic axis or too many
-    /// ticks.
+    /// [`TestMachinesError`] if the list is empty, or if a machine rejects a controller, has a property beyond the paper's
+    /// model or too many ticks.
     pub fn new(machines: &[Parameters]) -> Result<Self, TestMachinesError> {
         let mut variants = Vec::new();
         for machine in machines {
@@ -212,10 +231,7 @@ impl TestMachines {
             if ticks * MIN_PERIODS > MAX_TICKS {
                 return Err(TestMachinesError::Ticks { machine: config.name().to_owned(), ticks });
             }
-            if let Some(axis) = config.axes().iter().find(|axis| axis.transmission.is_some()) {
-                let (machine, axis) = (config.name().to_owned(), axis.name().to_owned());
-                return Err(TestMachinesError::Elastic { machine, axis });
-            }
+            config.axes().iter().try_for_each(|axis| reject_extended(config.name(), axis))?;
             for (name, laws) in VARIANTS {
                 variants.push(MachineVariant::new(machine, name, laws)?);
             }
