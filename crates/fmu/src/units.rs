@@ -12,6 +12,9 @@ pub(crate) fn base_unit(name: &str) -> Option<&'static str> {
         "µs" => r#"s="1" factor="1e-6""#,
         "s²" => r#"s="2""#,
         "s⁻¹" => r#"s="-1""#,
+        "Hz" => r#"s="-1""#,
+        // A level is dimensionless and has no linear conversion.
+        "dB" => "",
         "m/s" => r#"m="1" s="-1""#,
         "rad/s" => r#"rad="1" s="-1""#,
         "m/min" => r#"m="1" s="-1" factor="0.016666666666666666""#,

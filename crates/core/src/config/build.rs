@@ -7,10 +7,10 @@ use super::definition::MotorKind;
 use super::error::{ConfigError, ValueSource};
 use super::layout::JointVariant;
 use super::machine::{
-    AxisConfig, AxisKind, DelaysConfig, DeviationConfig, FeedforwardConfig, FrictionConfig, GpcConfig,
-    GravityConfig, KinematicsConfig, LimitsConfig, MachineConfig, MotorConfig, Periods, PiConfig,
-    PositionControllerConfig, PositionFeedback, PositionLoopConfig, PreslidingConfig, RstConfig,
-    StribeckConfig, TransmissionConfig,
+    AxisConfig, AxisKind, CurrentFilterConfig, DelaysConfig, DeviationConfig, FeedforwardConfig,
+    FrictionConfig, GpcConfig, GravityConfig, KinematicsConfig, LimitsConfig, MachineConfig, MotorConfig,
+    Periods, PiConfig, PositionControllerConfig, PositionFeedback, PositionLoopConfig, PreslidingConfig,
+    RstConfig, StribeckConfig, TransmissionConfig,
 };
 use super::parameters::Parameters;
 use super::value::Value;
@@ -181,6 +181,10 @@ impl AxisParameters<'_> {
                 allow_unstable: self.set.flag(&self.key("position_loop.allow_unstable")),
             },
             velocity_loop: pi("velocity_loop")?,
+            current_filters: [
+                self.current_filter("current_filter_1")?,
+                self.current_filter("current_filter_2")?,
+            ],
             current_loop: pi("current_loop")?,
             feedforward: FeedforwardConfig {
                 velocity: self.number("feedforward.velocity")?,
@@ -199,6 +203,23 @@ impl AxisParameters<'_> {
                 torque_constant: self.number("deviation.torque_constant")?,
             },
             limits: self.limits()?,
+        })
+    }
+
+    /// Returns a filter of the current setpoint; `None` for the type none.
+    fn current_filter(&self, name: &str) -> Result<Option<CurrentFilterConfig>, ConfigError> {
+        let number = |key: &str| self.number(&format!("{name}.{key}"));
+        Ok(match self.set.text(&self.key(&format!("{name}.type"))).as_str() {
+            "low_pass" => Some(CurrentFilterConfig::LowPass {
+                frequency: number("frequency_hz")?,
+                damping: number("damping")?,
+            }),
+            "notch" => Some(CurrentFilterConfig::Notch {
+                frequency: number("frequency_hz")?,
+                bandwidth: number("bandwidth_hz")?,
+                gain: 10_f64.powf(-number("depth_db")? / 20.0),
+            }),
+            _ => None,
         })
     }
 

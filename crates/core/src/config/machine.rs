@@ -87,6 +87,8 @@ pub struct AxisConfig {
     pub position_loop: PositionLoopConfig,
     /// Velocity controller.
     pub velocity_loop: PiConfig,
+    /// Filters of the current setpoint, in series; `None` is no filter.
+    pub current_filters: [Option<CurrentFilterConfig>; 2],
     /// Current controller.
     pub current_loop: PiConfig,
     /// Feedforward weights.
@@ -247,6 +249,38 @@ pub struct PiConfig {
     pub gain: f64,
     /// Integral time Tv or Ti, s.
     pub integral_time: f64,
+}
+
+/// Filter of the current setpoint between velocity controller and current limit, with gain 1 at frequency 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CurrentFilterConfig {
+    /// Low-pass filter ω²/(s² + 2 D ω s + ω²).
+    LowPass {
+        /// Natural frequency ω/2π, Hz.
+        frequency: f64,
+        /// Damping ratio D.
+        damping: f64,
+    },
+    /// Notch filter (s² + 2 D g ω s + ω²)/(s² + 2 D ω s + ω²) with D = bandwidth/(2 frequency).
+    Notch {
+        /// Center frequency ω/2π, Hz.
+        frequency: f64,
+        /// Bandwidth between the frequencies of −3 dB of a notch with gain 0, Hz.
+        bandwidth: f64,
+        /// Gain g at the center frequency, 0 to 1.
+        gain: f64,
+    },
+}
+
+impl CurrentFilterConfig {
+    /// Returns the natural or center frequency, Hz.
+    pub fn frequency(&self) -> f64 {
+        match *self {
+            CurrentFilterConfig::LowPass { frequency, .. } | CurrentFilterConfig::Notch { frequency, .. } => {
+                frequency
+            }
+        }
+    }
 }
 
 /// Feedforward weights (Prévost eqs. 6 and 7); 0 disables a term.

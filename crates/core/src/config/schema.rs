@@ -26,6 +26,8 @@ const FRICTION_EXPONENT: (f64, f64) = (-100.0, 1.0);
 pub const MAX_HORIZON: i64 = 200;
 /// Range of the plant deviation factors.
 const DEVIATION: (f64, f64) = (0.1, 10.0);
+/// Maximum frequency of a filter, Hz: half the rate of the shortest velocity period.
+const MAX_FILTER_FREQUENCY_HZ: f64 = 500e3;
 /// Minimum of divisors and of other positive quantities.
 const POSITIVE: f64 = 1e-9;
 /// Maximum loop gain, in its unit.
@@ -57,6 +59,29 @@ const fn gain(key: &'static str, unit: &'static str) -> ParameterDefinition {
 /// Defines an integral time, settable at run time.
 const fn integral_time(key: &'static str) -> ParameterDefinition {
     ParameterDefinition::number(key, "ms", INTEGRAL_TIME_MS.0, INTEGRAL_TIME_MS.1).of_axis().live()
+}
+
+/// Defines the type of a filter of the current setpoint, settable at run time.
+const fn filter_type(key: &'static str) -> ParameterDefinition {
+    ParameterDefinition::new(key, "", ParameterKind::Choice(&["none", "low_pass", "notch"]))
+        .of_axis()
+        .default(Text("none"))
+        .live()
+}
+
+/// Defines a frequency or bandwidth of a filter, settable at run time.
+const fn filter_frequency(key: &'static str) -> ParameterDefinition {
+    ParameterDefinition::number(key, "Hz", 1.0, MAX_FILTER_FREQUENCY_HZ).of_axis().optional().live()
+}
+
+/// Defines the damping ratio of a low-pass filter, settable at run time.
+const fn filter_damping(key: &'static str) -> ParameterDefinition {
+    ParameterDefinition::number(key, "", 0.05, 10.0).of_axis().default(Number(0.7)).live()
+}
+
+/// Defines the depth of a notch filter, settable at run time.
+const fn filter_depth(key: &'static str) -> ParameterDefinition {
+    ParameterDefinition::number(key, "dB", 0.0, 100.0).of_axis().default(Number(40.0)).live()
 }
 
 /// Defines a polynomial of an RST controller, settable at run time.
@@ -337,6 +362,20 @@ const MACHINE: &[ParameterDefinition] = &[
         .describe("Kv, proportional gain of the velocity loop (Prévost Appendix 2)."),
     integral_time("velocity_loop.integral_time_ms")
         .describe("Tv, integral time of the velocity loop (Prévost Appendix 2)."),
+    filter_type("current_filter_1.type").describe("Type of the first filter of the current setpoint."),
+    filter_frequency("current_filter_1.frequency_hz")
+        .describe("Natural frequency of the low-pass, center frequency of the notch, below half the rate of the velocity cycles."),
+    filter_damping("current_filter_1.damping").describe("Damping ratio D of the low-pass."),
+    filter_frequency("current_filter_1.bandwidth_hz")
+        .describe("Bandwidth of the notch, between its frequencies of -3 dB at infinite depth."),
+    filter_depth("current_filter_1.depth_db").describe("Attenuation of the notch at its center frequency."),
+    filter_type("current_filter_2.type").describe("Type of the second filter of the current setpoint, after the first."),
+    filter_frequency("current_filter_2.frequency_hz")
+        .describe("Natural frequency of the low-pass, center frequency of the notch, below half the rate of the velocity cycles."),
+    filter_damping("current_filter_2.damping").describe("Damping ratio D of the low-pass."),
+    filter_frequency("current_filter_2.bandwidth_hz")
+        .describe("Bandwidth of the notch, between its frequencies of -3 dB at infinite depth."),
+    filter_depth("current_filter_2.depth_db").describe("Attenuation of the notch at its center frequency."),
     gain("current_loop.gain", "V/A")
         .describe("Ki, proportional gain of the current loop (Prévost Appendix 2)."),
     integral_time("current_loop.integral_time_ms")

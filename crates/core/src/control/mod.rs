@@ -6,12 +6,14 @@
 //! position controller is a bumpless transfer.
 
 mod bumpless_transfer;
+mod current_filter;
 mod pi;
 mod position;
 mod rst;
 mod setpoint;
 
 pub use bumpless_transfer::{BumplessTransfer, BumplessTransferState};
+pub use current_filter::{BiquadFilter, BiquadState, CurrentFilterState, CurrentFilters};
 pub use pi::{Pi, PiState};
 pub use position::{FallbackController, PositionController, PositionState};
 pub(crate) use rst::INTEGRATOR_TOLERANCE;

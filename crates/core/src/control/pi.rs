@@ -54,19 +54,32 @@ impl<N: SimdReal> Pi<N> {
     /// Valid only for `scale` = 1, as in the current loop: the integral is not scaled.
     #[inline(always)]
     pub fn update(&self, s: &mut PiState<N>, error: N) -> N {
-        self.output(s, error, s.integral)
+        self.output(s, error, s.integral, |unlimited| unlimited)
     }
 
     /// Steps the controller by one cycle with an error and a feedforward; returns the scaled and limited output.
     #[inline(always)]
     pub fn update_with_feedforward(&self, s: &mut PiState<N>, error: N, feedforward: N) -> N {
-        self.output(s, error, (s.integral + feedforward) * self.scale)
+        self.update_with_filter(s, error, feedforward, |unlimited| unlimited)
+    }
+
+    /// Steps the controller by one cycle with an error, a feedforward, and a filter of the scaled output before its
+    /// limit; returns the limited output. The anti-windup compares the filtered output with its limit.
+    #[inline(always)]
+    pub fn update_with_filter(
+        &self,
+        s: &mut PiState<N>,
+        error: N,
+        feedforward: N,
+        filter: impl FnOnce(N) -> N,
+    ) -> N {
+        self.output(s, error, (s.integral + feedforward) * self.scale, filter)
     }
 
     #[inline(always)]
-    fn output(&self, s: &mut PiState<N>, error: N, offset: N) -> N {
+    fn output(&self, s: &mut PiState<N>, error: N, offset: N, filter: impl FnOnce(N) -> N) -> N {
         let step = self.integral_gain * error;
-        let unlimited = self.gain.mul_add(error, offset);
+        let unlimited = filter(self.gain.mul_add(error, offset));
         let y = clamp_abs(unlimited, self.limit);
         s.excess = unlimited - y;
         let zero = error.splat(0.0);

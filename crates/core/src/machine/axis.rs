@@ -4,8 +4,8 @@
 
 use crate::config::{AxisConfig, Periods, PositionFeedback};
 use crate::control::{
-    Delays, Feedforward, Pi, PiState, PositionController, PositionState, SetpointHistory, SetpointWindow,
-    TickDelay,
+    CurrentFilters, Delays, Feedforward, Pi, PiState, PositionController, PositionState, SetpointHistory,
+    SetpointWindow, TickDelay,
 };
 use crate::drive::{LoadState, MotorState, Plant};
 use crate::state_codec::StateCodec;
@@ -84,6 +84,7 @@ impl AxisParameters {
                     velocity_scale,
                     motor.max_current,
                 ),
+                filters: CurrentFilters::new(&axis.current_filters, seconds(periods.velocity)),
                 current: Pi::new(&axis.current_loop, tick, 1.0, motor.max_voltage),
             },
             position,
@@ -151,6 +152,7 @@ impl Axis {
             motor: MotorState { current, speed: 0.0, angle: angle + p.wind_up_feedback * wind_up },
             load: LoadState { wind_up, speed: 0.0 },
             velocity: PiState { integral: torque, excess: 0.0 },
+            filters: p.loops.filters.at_rest(current),
             current: PiState { integral: voltage, excess: 0.0 },
             current_setpoint: current,
             gravity,
@@ -173,7 +175,7 @@ impl Axis {
     /// Replaces the parameters `old` by `p` and keeps the state (bumpless transfer).
     ///
     /// The integral of the velocity loop changes by the difference of TFFWS, so that the torque does not jump. A new
-    /// position controller or feedforward starts a transfer of Ω*.
+    /// position controller or feedforward starts a transfer of Ω*. New filters start at rest at i*.
     pub(super) fn update_parameters(
         &mut self,
         old: &AxisParameters,
@@ -186,6 +188,10 @@ impl Axis {
         };
         let limit = p.torque_constant * p.max_current;
         state.velocity.integral += (torque(old) - torque(p)).clamp(-limit, limit);
+        // New filters start at rest at the present current setpoint.
+        if old.loops.filters != p.loops.filters {
+            state.filters = p.loops.filters.at_rest(state.current_setpoint);
+        }
         self.psec.set_window(p.setpoint_window());
         if (&old.position, &old.feedforward) != (&p.position, &p.feedforward) {
             self.position.begin_transfer();

@@ -8,7 +8,7 @@ use std::hint::black_box;
 
 use pulp::Simd;
 
-use crate::control::{Pi, PiState};
+use crate::control::{CurrentFilterState, CurrentFilters, Pi, PiState};
 use crate::drive::{FrictionExpansion, GravityExpansion, LoadState, MotorState, Plant};
 use crate::simd::{SimdLoad, SimdReal, Unroll2, Vector, soa_struct};
 use crate::state_codec::StateCodec;
@@ -19,6 +19,7 @@ soa_struct! {
     pub(super) struct InnerLoops {
         pub plant: Plant<N>,
         pub velocity: Pi<N>,
+        pub filters: CurrentFilters<N>,
         pub current: Pi<N>,
     }
 }
@@ -32,6 +33,7 @@ soa_struct! {
         /// Deflection of the bristles of friction, rad of the motor; 0 without presliding.
         pub deflection: N,
         pub velocity: PiState<N>,
+        pub filters: CurrentFilterState<N>,
         pub current: PiState<N>,
         /// i*, A.
         pub current_setpoint: N,
@@ -196,6 +198,8 @@ pub(super) struct AxisBlock<const L: usize> {
     has_presliding: bool,
     /// True if the friction law of any axis has a Stribeck or viscous term.
     has_stribeck_terms: bool,
+    /// True if the current setpoint of any axis is filtered.
+    has_filters: bool,
     /// Friction compensation of each velocity cycle, N·m at the motor; empty without compensation.
     compensation: Vec<Aligned<[f64; L]>>,
     /// Motor states at the start of each tick.
@@ -221,6 +225,7 @@ impl<const L: usize> AxisBlock<L> {
             has_elastic_axis: false,
             has_presliding: false,
             has_stribeck_terms: false,
+            has_filters: false,
             compensation: Vec::new(),
             motors: vec![Aligned(MotorState::default().fill()); ticks.position],
             loads: Vec::new(),
@@ -285,18 +290,19 @@ impl<const L: usize> AxisBlock<L> {
     pub fn set_loops(&mut self, lane: usize, loops: &InnerLoops) {
         self.loops.0.set_lane(lane, loops);
         self.expand(lane);
-        let any = |is: fn(&Plant) -> bool| (0..L).any(|lane| is(&self.loops.0.lane(lane).plant));
-        self.has_tilting_axis = any(|plant| plant.gravity.is_position_dependent());
-        self.has_elastic_axis = any(|plant| plant.transmission.is_elastic());
-        self.has_presliding = any(|plant| plant.presliding.is_present());
-        self.has_stribeck_terms = any(|plant| plant.friction_speed_drop.has_stribeck_terms());
+        let any = |is: fn(&InnerLoops) -> bool| (0..L).any(|lane| is(&self.loops.0.lane(lane)));
+        self.has_tilting_axis = any(|loops| loops.plant.gravity.is_position_dependent());
+        self.has_elastic_axis = any(|loops| loops.plant.transmission.is_elastic());
+        self.has_filters = any(|loops| loops.filters.is_enabled());
+        self.has_presliding = any(|loops| loops.plant.presliding.is_present());
+        self.has_stribeck_terms = any(|loops| loops.plant.friction_speed_drop.has_stribeck_terms());
         let rows = if self.has_elastic_axis { self.motors.len() } else { 0 };
         self.loads.resize_with(rows, || Aligned(LoadState::default().fill()));
     }
 
     /// Returns true if an axis has a property that the paper's model leaves out.
     fn is_extended(&self) -> bool {
-        self.has_elastic_axis || self.has_presliding || self.has_stribeck_terms
+        self.has_elastic_axis || self.has_presliding || self.has_stribeck_terms || self.has_filters
     }
 
     /// Expands friction and gravity of a lane at its present speed and angle.
@@ -325,8 +331,10 @@ impl<const L: usize> AxisBlock<L> {
     ///
     /// ```text
     /// e = Ω* + VFFWS − ω                    J = Iv + (Kv Tsv/Tv) e
-    /// w = (Kv e + J + TFFWS + C_comp)/Kt    i* = clamp(w, ±imax)         Iv ← Iv if (w − i*) e > 0, else J
+    /// w = F((Kv e + J + TFFWS + C_comp)/Kt) i* = clamp(w, ±imax)         Iv ← Iv if (w − i*) e > 0, else J
     /// ```
+    ///
+    /// F is the filters of the current setpoint in series; without filters, w is not filtered.
     ///
     /// Each tick (current cycle, period Tsi) executes the current PI controller with voltage limit and anti-windup,
     /// then steps the plant by its zero-order-hold discretization (Prévost eq. 1), with the friction law of
@@ -422,7 +430,9 @@ impl<const L: usize> AxisBlock<L> {
                     Some(row) => N::load(simd, &row.0, index),
                     None => zero,
                 };
-                excess = loops.control_velocity(&inputs, &mut state, velocity_cycle as f64, compensation);
+                let has_filters = IS_EXTENDED && self.has_filters;
+                let cycle = velocity_cycle as f64;
+                excess = loops.control_velocity(&inputs, &mut state, cycle, compensation, has_filters);
             }
             for tick in first..end {
                 let (law, speed) = (&loops.plant.friction_speed_drop, state.motor.speed);
@@ -504,11 +514,18 @@ impl<N: SimdReal> InnerLoops<N> {
         state: &mut InnerLoopState<N>,
         velocity_cycle: f64,
         compensation: N,
+        has_filters: bool,
     ) -> N {
         let setpoint = inputs.velocity_setpoint + inputs.velocity.at(velocity_cycle);
         let torque = inputs.torque.at(velocity_cycle) + compensation;
         let error = setpoint - state.motor.speed;
-        state.current_setpoint = self.velocity.update_with_feedforward(&mut state.velocity, error, torque);
+        let InnerLoopState { velocity, filters, .. } = state;
+        state.current_setpoint = match has_filters {
+            true => self.velocity.update_with_filter(velocity, error, torque, |setpoint| {
+                self.filters.update(filters, setpoint)
+            }),
+            false => self.velocity.update_with_feedforward(velocity, error, torque),
+        };
         let excess = state.velocity.excess.abs();
         state.max_current_excess = excess.max(state.max_current_excess);
         excess + inputs.velocity_excess.abs()

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use crate::config::{AxisConfig, MotorConfig, Periods, PositionFeedback, TransmissionConfig};
-use crate::control::{Pi, PiState};
+use crate::control::{BiquadState, CurrentFilterState, CurrentFilters, Pi, PiState};
 use crate::design::polynomial::product;
 use crate::design::{DesignError, PredictionModel};
 use crate::drive::{LoadState, Motor, MotorState, Plant, Transmission};
@@ -18,6 +18,12 @@ const MAX_GROWTH: f64 = 1e9;
 const RIGID_STATES: usize = 5;
 /// States of an elastic axis: wind-up and speed of the load in addition.
 const ELASTIC_STATES: usize = 7;
+/// States of the filters of the current setpoint, in addition to those of a rigid or elastic axis.
+const FILTER_STATES: usize = 4;
+/// States of a rigid axis with filters.
+const FILTERED_STATES: usize = RIGID_STATES + FILTER_STATES;
+/// States of an elastic axis with filters.
+const FILTERED_ELASTIC_STATES: usize = ELASTIC_STATES + FILTER_STATES;
 /// Hankel singular values of the velocity, relative to the largest, up to which states are left out: their share of θ
 /// is far below 1e-9.
 const NEGLIGIBLE_SINGULAR_VALUE: f64 = 1e-12;
@@ -51,9 +57,11 @@ fn model_with_drive(
     periods: &Periods,
 ) -> Result<PredictionModel, AxisError> {
     let loops = LinearInnerLoops::new(axis, motor, transmission, periods)?;
-    let (poles, numerator) = match transmission {
-        None => loops.realization::<RIGID_STATES>()?,
-        Some(_) => loops.realization::<ELASTIC_STATES>()?,
+    let (poles, numerator) = match (transmission, loops.filters.is_enabled()) {
+        (None, false) => loops.realization::<RIGID_STATES>()?,
+        (Some(_), false) => loops.realization::<ELASTIC_STATES>()?,
+        (None, true) => loops.realization::<FILTERED_STATES>()?,
+        (Some(_), true) => loops.realization::<FILTERED_ELASTIC_STATES>()?,
     };
     let a = product(&[1.0, -1.0], &poles);
     Ok(PredictionModel::new(a, numerator, seconds(periods.position))?)
@@ -65,12 +73,13 @@ struct LinearInnerLoops {
     transmission: Transmission,
     feedback: PositionFeedback,
     velocity: Pi,
+    filters: CurrentFilters,
     current: Pi,
     ticks_per_position: u64,
     ticks_per_velocity: u64,
 }
 
-/// Largest number of iterations of the singular value decomposition (4×4 or 6×6); about ten are usual.
+/// Largest number of iterations of the singular value decomposition (at most 10×10); about ten are usual.
 const SVD_ITERATIONS: usize = 1000;
 
 impl LinearInnerLoops {
@@ -96,6 +105,7 @@ impl LinearInnerLoops {
                 1.0 / torque_constant,
                 unlimited,
             ),
+            filters: CurrentFilters::new(&axis.current_filters, seconds(periods.velocity)),
             current: Pi::new(&axis.current_loop, tick, 1.0, unlimited),
             ticks_per_position: periods.ticks_per_position(),
             ticks_per_velocity: periods.ticks_per_velocity(),
@@ -108,7 +118,7 @@ impl LinearInnerLoops {
         // θ(k + 1) − θ(k) = C x(k) + D Ω*(k) has no integrator: it depends on all states but θ.
         let order = STATES - 1;
         let output = |state: &SVector<f64, STATES>| match (self.feedback, STATES) {
-            (PositionFeedback::Load, ELASTIC_STATES) => state[4] - state[5],
+            (PositionFeedback::Load, ELASTIC_STATES | FILTERED_ELASTIC_STATES) => state[4] - state[5],
             _ => state[4],
         };
         minimal_realization(&increment_markov_parameters(&transition, &input, output, 2 * order + 1), order)
@@ -122,22 +132,35 @@ impl LinearInnerLoops {
     ) -> SVector<f64, STATES> {
         let mut motor = MotorState { current: state[0], speed: state[1], angle: state[4] };
         let mut load = match STATES {
-            ELASTIC_STATES => LoadState { wind_up: state[5], speed: state[6] },
+            ELASTIC_STATES | FILTERED_ELASTIC_STATES => LoadState { wind_up: state[5], speed: state[6] },
             _ => LoadState::default(),
         };
+        let mut filters = CurrentFilterState::default();
+        if let FILTERED_STATES | FILTERED_ELASTIC_STATES = STATES {
+            let filter = |index| BiquadState { first: state[index], second: state[index + 1] };
+            let first = STATES - FILTER_STATES;
+            filters = CurrentFilterState { first: filter(first), second: filter(first + 2) };
+        }
         let mut velocity = PiState { integral: state[2], excess: 0.0 };
         let mut current = PiState { integral: state[3], excess: 0.0 };
         let mut current_setpoint = 0.0;
         for tick in 0..self.ticks_per_position {
             if tick.is_multiple_of(self.ticks_per_velocity) {
-                current_setpoint =
-                    self.velocity.update_with_feedforward(&mut velocity, setpoint - motor.speed, 0.0);
+                let filter = |current| self.filters.update(&mut filters, current);
+                let error = setpoint - motor.speed;
+                current_setpoint = self.velocity.update_with_filter(&mut velocity, error, 0.0, filter);
             }
             let voltage = self.current.update(&mut current, current_setpoint - motor.current);
             (motor, load) = self.transmission.step(&self.motor, &motor, &load, voltage, 0.0);
         }
         let rigid = [motor.current, motor.speed, velocity.integral, current.integral, motor.angle];
-        SVector::from_iterator(rigid.into_iter().chain([load.wind_up, load.speed]))
+        let elastic = match STATES {
+            ELASTIC_STATES | FILTERED_ELASTIC_STATES => [Some(load.wind_up), Some(load.speed)],
+            _ => [None, None],
+        };
+        let CurrentFilterState { first, second } = filters;
+        let filters = [first.first, first.second, second.first, second.second];
+        SVector::from_iterator(rigid.into_iter().chain(elastic.into_iter().flatten()).chain(filters))
     }
 
     /// Returns Φ and Γ of `x(k + 1) = Φ x(k) + Γ Ω*(k)` over one position cycle.

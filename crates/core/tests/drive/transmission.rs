@@ -14,7 +14,7 @@ use virtual_axes_verification::fixtures::machines::{AXES, TSP, configured_with};
 
 use crate::parameter_ranges::{golden, run_demanding_setpoints};
 
-const X: usize = 0;
+pub const X: usize = 0;
 /// X with a table of 1200 kg behind 200 N/µm: antiresonance 65 Hz, resonance 86 Hz.
 pub const ELASTIC_X: [&str; 3] = [
     "x.transmission.stiffness_n_um=200",
@@ -24,9 +24,9 @@ pub const ELASTIC_X: [&str; 3] = [
 /// A with a table behind a worm gear.
 const ELASTIC_A: [&str; 2] = ["a.transmission.stiffness_nm_rad=2e6", "a.transmission.load_inertia_kg_m2=12"];
 /// Without friction and gravity on X.
-const FRICTIONLESS: [&str; 3] = ["x.friction.a=0", "x.friction.c=0", "x.friction.i0=0"];
+pub const FRICTIONLESS: [&str; 3] = ["x.friction.a=0", "x.friction.c=0", "x.friction.i0=0"];
 
-fn machine(changes: &[&str]) -> MachineConfig {
+pub fn machine(changes: &[&str]) -> MachineConfig {
     configured_with("mikron_ucp710", &[], changes)
 }
 

@@ -149,6 +149,7 @@ pub(super) fn draw_axis(
             allow_unstable: false,
         },
         velocity_loop,
+        current_filters: [None, None],
         current_loop: PiConfig { gain: current_bandwidth * inductance, integral_time: 2e-3 },
         feedforward: FeedforwardConfig { velocity: 1.0, torque: mechanics.inertia, friction: 0.0 },
         delays: DelaysConfig {
