@@ -70,8 +70,11 @@ const fn filter_type(key: &'static str) -> ParameterDefinition {
 }
 
 /// Defines a frequency or bandwidth of a filter, settable at run time.
-const fn filter_frequency(key: &'static str) -> ParameterDefinition {
-    ParameterDefinition::number(key, "Hz", 1.0, MAX_FILTER_FREQUENCY_HZ).of_axis().optional().live()
+const fn filter_frequency(key: &'static str, default: f64) -> ParameterDefinition {
+    ParameterDefinition::number(key, "Hz", 1.0, MAX_FILTER_FREQUENCY_HZ)
+        .of_axis()
+        .default(Number(default))
+        .live()
 }
 
 /// Defines the damping ratio of a low-pass filter, settable at run time.
@@ -363,17 +366,17 @@ const MACHINE: &[ParameterDefinition] = &[
     integral_time("velocity_loop.integral_time_ms")
         .describe("Tv, integral time of the velocity loop (Prévost Appendix 2)."),
     filter_type("current_filter_1.type").describe("Type of the first filter of the current setpoint."),
-    filter_frequency("current_filter_1.frequency_hz")
+    filter_frequency("current_filter_1.frequency_hz", 200.0)
         .describe("Natural frequency of the low-pass, center frequency of the notch, below half the rate of the velocity cycles."),
     filter_damping("current_filter_1.damping").describe("Damping ratio D of the low-pass."),
-    filter_frequency("current_filter_1.bandwidth_hz")
+    filter_frequency("current_filter_1.bandwidth_hz", 100.0)
         .describe("Bandwidth of the notch, between its frequencies of -3 dB at infinite depth."),
     filter_depth("current_filter_1.depth_db").describe("Attenuation of the notch at its center frequency."),
     filter_type("current_filter_2.type").describe("Type of the second filter of the current setpoint, after the first."),
-    filter_frequency("current_filter_2.frequency_hz")
+    filter_frequency("current_filter_2.frequency_hz", 200.0)
         .describe("Natural frequency of the low-pass, center frequency of the notch, below half the rate of the velocity cycles."),
     filter_damping("current_filter_2.damping").describe("Damping ratio D of the low-pass."),
-    filter_frequency("current_filter_2.bandwidth_hz")
+    filter_frequency("current_filter_2.bandwidth_hz", 100.0)
         .describe("Bandwidth of the notch, between its frequencies of -3 dB at infinite depth."),
     filter_depth("current_filter_2.depth_db").describe("Attenuation of the notch at its center frequency."),
     gain("current_loop.gain", "V/A")

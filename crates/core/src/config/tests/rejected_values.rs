@@ -307,3 +307,35 @@ fn fast_time_with_use_sim_time() {
          /clock, use_sim_time = true subscribes to it",
     );
 }
+
+/// Returns the default machine with a filter of the current setpoint of X.
+fn filtered(filter: &str) -> String {
+    mikron_with(
+        "    x:\n      type: linear",
+        &format!("    x:\n      current_filter_1: {filter}\n      type: linear"),
+    )
+}
+
+#[test]
+fn filter_frequency_at_half_the_rate_of_velocity_cycles() {
+    assert_rejected(
+        &filtered("{type: low_pass, frequency_hz: 2500}"),
+        "current_filter_1",
+        "my.yaml:{line}: x.current_filter_1.frequency_hz = 2500: must keep x.current_filter_1.frequency_hz below \
+         2000 Hz, half the rate of velocity cycles of 250 µs",
+    );
+}
+
+#[test]
+fn unknown_filter_type_and_bandwidth_of_zero() {
+    assert_rejected(
+        &filtered("{type: band_pass}"),
+        "current_filter_1",
+        "my.yaml:{line}: x.current_filter_1.type = band_pass: must be none or low_pass or notch",
+    );
+    assert_rejected(
+        &filtered("{type: notch, bandwidth_hz: 0}"),
+        "current_filter_1",
+        "my.yaml:{line}: x.current_filter_1.bandwidth_hz = 0: must lie in 1 … 5e5 Hz",
+    );
+}
