@@ -69,8 +69,8 @@ fn every_live_key_accepts_both_ends_of_its_range() {
             assert_eq!(parameters, start);
         }
     }
-    // 28 on each of five axes, and four of the node.
-    assert_eq!(live, 2 * (5 * 28 + 4));
+    // 38 on each of five axes, and four of the node.
+    assert_eq!(live, 2 * (5 * 38 + 4));
 }
 
 #[test]
