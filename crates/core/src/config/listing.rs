@@ -46,7 +46,11 @@ pub fn group(definition: &ParameterDefinition) -> &'static str {
         (Scope::Machine, _) => "machine",
         (Scope::Axis, "friction" | "gravity") => "friction",
         (Scope::Axis, "position_loop") => "position-loop",
-        (Scope::Axis, "velocity_loop" | "current_loop" | "feedforward" | "delays") => "inner-loops",
+        (
+            Scope::Axis,
+            "velocity_loop" | "current_filter_1" | "current_filter_2" | "current_loop" | "feedforward"
+            | "delays",
+        ) => "inner-loops",
         (Scope::Axis, "limits" | "tolerances") => "limits",
         (Scope::Axis, "deviation") => "deviation",
         (Scope::Axis, _) => "axis",
