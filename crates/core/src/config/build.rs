@@ -41,6 +41,7 @@ impl Parameters {
                 .iter()
                 .map(|joint| AxisParameters { set: self, joint }.config())
                 .collect::<Result<_, _>>()?,
+            contour_gain: self.number("contour_control.gain")? * POSITION_GAIN,
         })
     }
 

@@ -15,6 +15,8 @@ pub struct MachineConfig {
     pub(crate) periods: Periods,
     pub(crate) kinematics: KinematicsConfig,
     pub(crate) axes: Vec<AxisConfig>,
+    /// Gain of cross-coupled control, 1/s; 0 without it.
+    pub(crate) contour_gain: f64,
 }
 
 /// Sampling periods of the three loops, each an integer multiple of the next (Prévost Appendix 2).
@@ -349,6 +351,7 @@ impl MachineConfig {
             periods,
             kinematics: KinematicsConfig::default(),
             axes: vec![axis],
+            contour_gain: 0.0,
         }
     }
 

@@ -163,6 +163,10 @@ const MACHINE: &[ParameterDefinition] = &[
     coordinate("kinematics.workpiece_x_mm").describe("X of the origin of the workpiece frame."),
     coordinate("kinematics.workpiece_y_mm").describe("Y of the origin of the workpiece frame."),
     coordinate("kinematics.workpiece_z_mm").describe("Z of the origin of the workpiece frame."),
+    ParameterDefinition::number("contour_control.gain", "(m/min)/mm", 0.0, MAX_GAIN)
+        .default(Number(0.0))
+        .live()
+        .describe("Gain of cross-coupled control of the linear axes, feedback of the contour error; 0 disables it."),
     // Axis and transmission.
     ParameterDefinition::new("type", "", ParameterKind::Choice(&["linear", "rotary"]))
         .of_axis()

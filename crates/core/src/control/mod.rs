@@ -6,6 +6,7 @@
 //! position controller is a bumpless transfer.
 
 mod bumpless_transfer;
+mod contour_error;
 mod current_filter;
 mod pi;
 mod position;
@@ -13,6 +14,7 @@ mod rst;
 mod setpoint;
 
 pub use bumpless_transfer::{BumplessTransfer, BumplessTransferState};
+pub use contour_error::{CONTOUR_AXES, CONTOUR_LOOKBACK, ContourVector, contour_error};
 pub use current_filter::{BiquadFilter, BiquadState, CurrentFilterState, CurrentFilters};
 pub use pi::{Pi, PiState};
 pub use position::{FallbackController, PositionController, PositionState};

@@ -4,8 +4,8 @@
 
 use crate::config::{AxisConfig, Periods, PositionFeedback};
 use crate::control::{
-    CurrentFilters, Delays, Feedforward, Pi, PiState, PositionController, PositionState, SetpointHistory,
-    SetpointWindow, TickDelay,
+    CONTOUR_LOOKBACK, CurrentFilters, Delays, Feedforward, Pi, PiState, PositionController, PositionState,
+    SetpointHistory, SetpointWindow, TickDelay,
 };
 use crate::drive::{LoadState, MotorState, Plant};
 use crate::state_codec::StateCodec;
@@ -24,6 +24,8 @@ pub struct AxisParameters {
     controller: &'static str,
     feedforward: Feedforward,
     pub(super) compensation: Option<FrictionCompensation>,
+    /// True if the axis is one of those of cross-coupled control.
+    pub(super) has_contour_control: bool,
     delays: Delays,
     /// Weight of the wind-up in the angle that the position controller reads: 1 with an encoder at the load, else 0.
     wind_up_feedback: f64,
@@ -57,7 +59,11 @@ impl AxisParameters {
         let compensation = self.compensation.as_ref().map_or(0, FrictionCompensation::preview);
         SetpointWindow {
             delay: self.delays.longest(),
-            lookback: self.position.lookback() as usize,
+            lookback: (self.position.lookback() as usize).max(if self.has_contour_control {
+                CONTOUR_LOOKBACK + 2
+            } else {
+                0
+            }),
             preview: (self.position.preview() - delay).max(compensation).max(0) as usize,
         }
     }
@@ -95,6 +101,7 @@ impl AxisParameters {
                 axis.transmission_ratio,
             ),
             compensation,
+            has_contour_control: false,
             position_delay: TickDelay::new(delays.position, ticks),
             velocity_delay: TickDelay::new(delays.velocity, ticks),
             torque_delay: TickDelay::new(delays.torque, ticks),
@@ -127,6 +134,9 @@ pub struct Axis {
     load: f64,
     /// Offset that is added to the output of the position controller, rad/s of the motor.
     velocity_offset: f64,
+    /// Part of cross-coupled control in the output of the position controller, rad/s of the motor; 0 between two
+    /// position cycles.
+    contour_offset: f64,
     psec: SetpointHistory,
     position: PositionState,
     /// Inputs to the inner loops in the present position cycle.
@@ -161,6 +171,7 @@ impl Axis {
         let mut axis = Axis {
             load: 0.0,
             velocity_offset: 0.0,
+            contour_offset: 0.0,
             psec: SetpointHistory::new(position, p.ticks_per_position, p.setpoint_window()),
             position: PositionState::at_rest(angle),
             inputs: InnerLoopInputs::default(),
@@ -222,9 +233,28 @@ impl Axis {
         self.inputs.load
     }
 
+    /// Sets the setpoint of the position cycle that begins, and the known setpoints after it.
+    pub(super) fn set_setpoint(&mut self, psec: f64, preview: &[f64]) {
+        self.psec.push(psec);
+        self.psec.set_preview(preview);
+    }
+
+    /// Returns the setpoint `offset` position cycles after that delayed by α, m or rad.
+    pub(super) fn delayed_setpoint(&self, p: &AxisParameters, offset: i64) -> f64 {
+        self.psec.at(p.position_delay.index_at_cycle_start(self.psec.present_index()) + offset)
+    }
+
+    /// Returns the position that the position controller reads, m or rad.
+    pub(super) fn measured_position(&self, p: &AxisParameters, state: &InnerLoopState) -> f64 {
+        p.loops.plant.position(state.motor.angle - p.wind_up_feedback * state.load.wind_up)
+    }
+
+    /// Sets the velocity that cross-coupled control adds in the present position cycle, m/s.
+    pub(super) fn set_contour_offset(&mut self, p: &AxisParameters, velocity: f64) {
+        self.contour_offset = velocity * p.inverse_ratio;
+    }
+
     /// Executes the position loop at the start of a position cycle: returns the inputs to the inner loops.
-    ///
-    /// `psec` is the setpoint of the cycle, `preview` contains the known setpoints after it.
     ///
     /// ```text
     /// Ω* = clamp(position controller(PSEC delayed by α / r, θ) + offset, ±Ωmax)    (Prévost fig. 3, eq. 9)
@@ -234,15 +264,11 @@ impl Axis {
         &mut self,
         p: &AxisParameters,
         state: &InnerLoopState,
-        psec: f64,
-        preview: &[f64],
     ) -> InnerLoopInputs {
-        self.psec.push(psec);
-        self.psec.set_preview(preview);
         let present = self.psec.present_index();
         let (history, motor) = (&self.psec, &state.motor);
         let k = p.position_delay.index_at_cycle_start(present);
-        self.sample.psec = psec;
+        self.sample.psec = history.at(present);
         self.sample.delayed_psec = history.at(k);
         if state.max_current_excess > 0.0 {
             self.position.record_saturated(motor.speed);
@@ -257,9 +283,10 @@ impl Axis {
         let setpoint = |j| history.at(k + j) * p.inverse_ratio;
         let angle = motor.angle - p.wind_up_feedback * state.load.wind_up;
         let mut unlimited = p.position.update(&mut self.position, setpoint, angle, feedforward);
+        let offset = self.velocity_offset + std::mem::take(&mut self.contour_offset);
         // Adding 0 would change the sign of -0.
-        if self.velocity_offset != 0.0 {
-            unlimited += self.velocity_offset;
+        if offset != 0.0 {
+            unlimited += offset;
         }
         // An unstable RST controller (allow_unstable) can overflow: the axis stops then.
         let finite = if unlimited.is_finite() { unlimited } else { 0.0 };

@@ -7,6 +7,7 @@ mod axis;
 mod bank;
 mod closed_loop;
 mod compensation;
+mod contour_control;
 mod controller;
 mod inner_loops;
 mod prediction;
@@ -26,9 +27,10 @@ use std::sync::Arc;
 use crate::config::{AxisConfig, MachineConfig, Periods};
 use crate::design::DesignError;
 use crate::drive::DriveError;
-use crate::units::Nanoseconds;
+use crate::units::{Nanoseconds, POSITION_GAIN, Rounded};
 
 use bank::AxisBank;
+use contour_control::ContourControl;
 use inner_loops::{CycleTicks, InnerLoops, TickSpan};
 
 /// Error of building a machine or changing its parameters.
@@ -58,6 +60,17 @@ pub enum AxisError {
     /// Position controller that cannot be designed.
     #[error("position_loop: {0}")]
     Design(#[from] DesignError),
+    /// Position loop that is unstable with cross-coupled control.
+    #[error(
+        "contour_control.gain = {} (m/min)/mm, added to the position loop: {source}",
+        Rounded(gain / POSITION_GAIN)
+    )]
+    ContourControl {
+        /// Gain, 1/s.
+        gain: f64,
+        /// Error of the design.
+        source: DesignError,
+    },
 }
 
 /// Immutable parameters of a machine, discretized.
@@ -65,6 +78,7 @@ pub enum AxisError {
 pub struct MachineParameters {
     periods: Periods,
     axes: Vec<AxisParameters>,
+    contour_controls: Vec<ContourControl>,
 }
 
 impl MachineParameters {
@@ -86,7 +100,14 @@ impl MachineParameters {
                 .map_err(|source| MachineError::Axis { axis: axis.name.clone(), source })
         };
         let axes = indices.iter().filter_map(|&index| config.axes.get(index));
-        Ok(MachineParameters { periods: config.periods, axes: axes.map(axis).collect::<Result<_, _>>()? })
+        let mut axes: Vec<AxisParameters> = axes.map(axis).collect::<Result<_, _>>()?;
+        let contour_control = ContourControl::new(config, indices)?;
+        for (index, axis) in axes.iter_mut().enumerate() {
+            axis.has_contour_control =
+                contour_control.as_ref().is_some_and(|control| control.contains(index));
+        }
+        let contour_controls = contour_control.into_iter().collect();
+        Ok(MachineParameters { periods: config.periods, axes, contour_controls })
     }
 
     /// Returns the periods of the control loops.
@@ -98,8 +119,13 @@ impl MachineParameters {
     pub fn concatenate(machines: &[Arc<MachineParameters>]) -> Option<Self> {
         let periods = machines.first()?.periods;
         let is_same = machines.iter().all(|machine| machine.periods == periods);
-        let axes = machines.iter().flat_map(|machine| machine.axes.iter().cloned());
-        is_same.then(|| MachineParameters { periods, axes: axes.collect() })
+        let (mut axes, mut contour_controls) = (Vec::new(), Vec::new());
+        for machine in machines {
+            contour_controls
+                .extend(machine.contour_controls.iter().map(|control| control.behind(axes.len())));
+            axes.extend(machine.axes.iter().cloned());
+        }
+        is_same.then_some(MachineParameters { periods, axes, contour_controls })
     }
 
     fn cycle_ticks(&self) -> CycleTicks {
@@ -354,12 +380,15 @@ impl Machine {
     fn execute_position_loops(&mut self, psec: &[f64], preview: &[f64]) {
         let known = preview.len() / self.axes.len().max(1);
         let parameters = &*self.parameters;
-        for (index, ((axis, p), &setpoint)) in
-            self.axes.iter_mut().zip(&parameters.axes).zip(psec).enumerate()
-        {
+        for (index, (axis, &setpoint)) in self.axes.iter_mut().zip(psec).enumerate() {
+            axis.set_setpoint(setpoint, &preview[index * known..][..known]);
+        }
+        for contour_control in &parameters.contour_controls {
+            contour_control.execute(&mut self.axes, &parameters.axes, &self.bank);
+        }
+        for (index, (axis, p)) in self.axes.iter_mut().zip(&parameters.axes).take(psec.len()).enumerate() {
             let state = self.bank.state(index);
-            let known_setpoints = &preview[index * known..][..known];
-            let inputs = axis.execute_position_loop(p, &state, setpoint, known_setpoints);
+            let inputs = axis.execute_position_loop(p, &state);
             self.bank.set_inputs(index, &inputs);
             if let Some(compensation) = &p.compensation {
                 let torque = |velocity_cycle| axis.compensation_torque(compensation, p, velocity_cycle);

@@ -1,0 +1,93 @@
+//! Cross-coupled control: feedback of the contour error, beside the position controllers of the linear axes.
+
+use crate::config::{AxisConfig, AxisKind, MachineConfig, Periods};
+use crate::control::{CONTOUR_AXES, ContourVector, Rst, contour_error};
+use crate::design::{DesignError, check_stable};
+
+use super::bank::AxisBank;
+use super::{Axis, AxisError, AxisParameters, MachineError, design_controller, prediction_model};
+
+/// Cross-coupled control of the linear axes of one machine (Koren, Journal of Dynamic Systems, Measurement and Control
+/// 102, 1980; with the contour error as a vector).
+///
+/// ```text
+/// Ω*_axis ← Ω*_axis + K ε_axis/r
+/// ```
+///
+/// ε is the contour error, the deviation from the path of the delayed setpoints ([`contour_error`]). The loop has the gain
+/// Kp + K across the path and Kp along it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ContourControl {
+    /// K, 1/s.
+    gain: f64,
+    /// Indices of the linear axes.
+    axes: Vec<usize>,
+}
+
+impl ContourControl {
+    /// Creates the control of the axes of `config` at `indices`; `None` without a gain or without two linear axes.
+    ///
+    /// # Errors
+    /// [`MachineError::Axis`] with [`AxisError::ContourControl`] if the gain makes the loop of an axis unstable.
+    pub fn new(config: &MachineConfig, indices: &[usize]) -> Result<Option<Self>, MachineError> {
+        let gain = config.contour_gain;
+        let is_linear = |&&(_, axis): &&(usize, &AxisConfig)| axis.kind == AxisKind::Linear;
+        let selected: Vec<(usize, &AxisConfig)> =
+            indices.iter().filter_map(|&index| config.axes.get(index)).enumerate().collect();
+        let linear: Vec<_> = selected.iter().filter(is_linear).take(CONTOUR_AXES).collect();
+        if gain <= 0.0 || linear.len() < 2 {
+            return Ok(None);
+        }
+        for (_, axis) in &linear {
+            require_stable_contour(axis, &config.periods, gain)
+                .map_err(|source| MachineError::Axis { axis: axis.name.clone(), source })?;
+        }
+        Ok(Some(ContourControl { gain, axes: linear.iter().map(|(index, _)| *index).collect() }))
+    }
+
+    /// Returns the control of a machine whose axes come after `count` others.
+    pub fn behind(&self, count: usize) -> Self {
+        ContourControl { gain: self.gain, axes: self.axes.iter().map(|axis| axis + count).collect() }
+    }
+
+    /// Returns true if an axis is controlled.
+    pub fn contains(&self, axis: usize) -> bool {
+        self.axes.contains(&axis)
+    }
+
+    /// Sets the offsets of the velocity setpoints for the present position cycle.
+    pub fn execute(&self, axes: &mut [Axis], parameters: &[AxisParameters], bank: &AxisBank) {
+        let mut position: ContourVector = [0.0; CONTOUR_AXES];
+        for (coordinate, &index) in position.iter_mut().zip(&self.axes) {
+            *coordinate = axes[index].measured_position(&parameters[index], &bank.state(index));
+        }
+        let setpoint = |j: i64| {
+            let mut point = [0.0; CONTOUR_AXES];
+            for (coordinate, &index) in point.iter_mut().zip(&self.axes) {
+                *coordinate = axes[index].delayed_setpoint(&parameters[index], j);
+            }
+            point
+        };
+        let error = contour_error(setpoint, position);
+        for (error, &index) in error.iter().zip(&self.axes) {
+            axes[index].set_contour_offset(&parameters[index], self.gain * error);
+        }
+    }
+}
+
+/// Checks that the position loop of `axis` is stable with the gain of cross-coupled control in addition, as across a path
+/// perpendicular to the axis.
+fn require_stable_contour(axis: &AxisConfig, periods: &Periods, gain: f64) -> Result<(), AxisError> {
+    if axis.position_loop.allow_unstable {
+        return Ok(());
+    }
+    let model = prediction_model(axis, periods)?;
+    let rst = design_controller(axis, &model)?;
+    let mut r = rst.r().to_vec();
+    // The controller sees the sum as its output, so that K adds to r₀ in units of s₀.
+    r[0] += gain * rst.s()[0];
+    // T has no part in the stability.
+    let t = [r.iter().sum()];
+    let sum = Rst::new(&r, rst.s(), &t, 0).map_err(DesignError::from)?;
+    check_stable(&model, &sum).map_err(|source| AxisError::ContourControl { gain, source })
+}
