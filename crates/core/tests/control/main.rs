@@ -1,6 +1,7 @@
 //! Tests of position controllers: design, margins, predictive control, bumpless transfer.
 
 mod bumpless_transfer;
+mod contour;
 mod design_common;
 mod design_controllers;
 mod design_margins;
