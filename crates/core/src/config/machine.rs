@@ -355,6 +355,11 @@ impl MachineConfig {
         }
     }
 
+    /// Returns the gain of cross-coupled control, 1/s; 0 without it.
+    pub fn contour_gain(&self) -> f64 {
+        self.contour_gain
+    }
+
     /// Returns the machine without velocity and travel limits of trajectories, for setpoints that may exceed them.
     #[must_use]
     pub fn without_trajectory_limits(&self) -> Self {

@@ -25,6 +25,11 @@ pub enum LearningError {
         /// Error of the design.
         source: DesignError,
     },
+    /// Machine with cross-coupled control, which the closed loops of single axes do not contain.
+    #[error(
+        "contour_control.gain must be 0 to learn: the convergence is computed for axes without cross-coupled control"
+    )]
+    ContourControl,
     /// Path without motion of any axis.
     #[error("no axis moves: there is nothing to learn")]
     NothingMoves,

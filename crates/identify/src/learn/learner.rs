@@ -34,6 +34,9 @@ impl<'a> Learner<'a> {
         figures: &Figures,
         options: &LearningOptions,
     ) -> Result<Self, LearningError> {
+        if machine.contour_gain() > 0.0 {
+            return Err(LearningError::ContourControl);
+        }
         let periods = machine.periods();
         let all = machine.axes().iter().enumerate().zip(&figures.axes);
         let moving: Vec<(usize, &AxisConfig)> =
