@@ -188,6 +188,12 @@ fn invalid_options_and_idle_machines_are_rejected() {
     let tuning = LearningTuning { gain: 2.5, bandwidth: None };
     let refused = text(LearningOptions { tuning, ..OPTIONS });
     assert!(refused.starts_with("axis x: the learning does not converge: |Q (1 − L T)| is "), "{refused}");
+    let mut contour = machine(&["x", "y"]);
+    let gain = Value::Double(2.0);
+    contour.set("contour_control.gain", gain, &ValueSource::named("test")).expect("a parameter");
+    let contour = contour.machine_config().expect("a machine");
+    let error = learn(&contour, &path, &OPTIONS, false, false, &NoProgress).expect_err("an error");
+    assert!(error.to_string().starts_with("contour_control.gain must be 0"), "{error}");
     let rest = [0.0; 40];
     let idle = SetpointSource::Grid(Box::new(GridRows::new(&[0, 1], &rest)));
     let idle = Workload::read("rest", None, idle, || Ok(())).expect("rows");

@@ -69,8 +69,8 @@ fn every_live_key_accepts_both_ends_of_its_range() {
             assert_eq!(parameters, start);
         }
     }
-    // 38 on each of five axes, and four of the node.
-    assert_eq!(live, 2 * (5 * 38 + 4));
+    // 38 on each of five axes, one of the machine, and four of the node.
+    assert_eq!(live, 2 * (5 * 38 + 1 + 4));
 }
 
 #[test]
