@@ -5,10 +5,10 @@
     python tools/golden_presliding.py
 
 Nothing here is taken from the library. The equations are those of Canudas de Wit, Olsson, Åström and Lischinsky, "A new
-model for control of systems with friction", IEEE Transactions on Automatic Control 40 (1995), with the parameters of its
-table 1, solved by the Radau IIA method with tolerances of 1e-11. Columns: case, time (s), position (m), velocity (m/s),
-friction force (N). Cases: 0, presliding: a force on a mass of 1 kg rises to 95 % of the breakaway force, changes its sign
-and rises again; 1, stick-slip: a spring of 2 N/m, whose end moves at 0.1 m/s, pulls the mass.
+model for control of systems with friction", IEEE Transactions on Automatic Control 40 (1995), with the parameters of
+its table 1, solved by the Radau IIA method with tolerances of 1e-11. Columns: case, time (s), position (m), velocity
+(m/s), friction force (N). Cases: 0, presliding: a force on a mass of 1 kg rises to 95 % of the breakaway force, changes
+its sign and rises again; 1, stick-slip: a spring of 2 N/m, whose end moves at 0.1 m/s, pulls the mass.
 """
 
 import math
@@ -57,9 +57,7 @@ def solve(force, end, rows, max_step):
         return [velocity, acceleration, bristle_speed(velocity, deflection)]
 
     times = [end * k / rows for k in range(1, rows + 1)]
-    solution = solve_ivp(
-        slope, (0.0, end), [0.0, 0.0, 0.0], "Radau", times, rtol=1e-11, atol=1e-14, max_step=max_step
-    )
+    solution = solve_ivp(slope, (0.0, end), [0.0, 0.0, 0.0], "Radau", times, rtol=1e-11, atol=1e-14, max_step=max_step)
     if not solution.success:
         raise RuntimeError(solution.message)
     for time, position, velocity, deflection in zip(times, *solution.y, strict=True):
