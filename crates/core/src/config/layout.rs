@@ -106,8 +106,8 @@ impl ParameterLayout {
         }
     }
 
-    /// Returns the keys of the first joint that has keys ending in `.` and `end`, joined by "or"; `None` if there are
-    /// none.
+    /// Returns the keys of the first joint that has keys ending in `.` and `end`, and those of no joint, joined by "or";
+    /// `None` if there are none.
     fn keys_with_end(&self, end: &str) -> Option<String> {
         let suffix = format!(".{end}");
         let found: Vec<String> = self
@@ -115,9 +115,16 @@ impl ParameterLayout {
             .map(|(known, _)| known.to_string())
             .filter(|known| known.ends_with(&suffix))
             .collect();
-        let joint = found.first()?.split('.').next()?;
-        let of_joint = |key: &&String| key.split('.').next() == Some(joint);
-        Some(found.iter().filter(of_joint).map(String::as_str).collect::<Vec<_>>().join(" or "))
+        let joint_of = |key: &str| {
+            let first = key.split('.').next().unwrap_or_default();
+            self.joints.iter().position(|joint| joint.name == first)
+        };
+        let joint = found.iter().find_map(|key| joint_of(key));
+        let (of_joint, others): (Vec<&String>, Vec<&String>) =
+            found.iter().partition(|key| joint_of(key).is_some());
+        let keys = of_joint.into_iter().filter(|key| joint_of(key) == joint).chain(others);
+        let keys: Vec<&str> = keys.map(String::as_str).collect();
+        (!keys.is_empty()).then(|| keys.join(" or "))
     }
 }
 
