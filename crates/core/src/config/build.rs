@@ -7,12 +7,14 @@ use super::definition::MotorKind;
 use super::error::{ConfigError, ValueSource};
 use super::layout::JointVariant;
 use super::machine::{
-    AxisConfig, AxisKind, CurrentFilterConfig, DelaysConfig, DeviationConfig, FeedforwardConfig,
-    FrictionConfig, GpcConfig, GravityConfig, KinematicsConfig, LimitsConfig, MachineConfig, MotorConfig,
-    Periods, PiConfig, PositionControllerConfig, PositionFeedback, PositionLoopConfig, PreslidingConfig,
-    RstConfig, StribeckConfig, TransmissionConfig,
+    AxisConfig, AxisKind, CurrentFilterConfig, DelaysConfig, DeviationConfig, FeedforwardConfig, GpcConfig,
+    KinematicsConfig, LimitsConfig, MachineConfig, Periods, PiConfig, PositionControllerConfig,
+    PositionFeedback, PositionLoopConfig, RstConfig,
 };
 use super::parameters::Parameters;
+use super::plant::{
+    FrictionConfig, GravityConfig, MotorConfig, PreslidingConfig, StribeckConfig, TransmissionConfig,
+};
 use super::value::Value;
 use crate::units::{
     DEGREE, METER_PER_MINUTE, MICROSECOND_NS, MILLIHENRY, MILLIMETER, MILLISECOND, MILLISECOND_NS,

@@ -8,6 +8,7 @@ use super::definition::MotorKind::{Linear as LinearMotor, Rotary as RotaryMotor}
 use super::definition::{ParameterDefinition, ParameterKind};
 use super::machine::AxisKind::{Linear, Rotary};
 use super::node_schema::NODE;
+use super::plant_schema::PLANT;
 
 /// Range of sampling periods, ms; the resolution of the pacing in the node is 1 µs.
 const PERIOD_MS: (f64, f64) = (1e-3, 50.0);
@@ -17,19 +18,12 @@ const PERIOD_US: (f64, f64) = (1.0, 50e3);
 const MAX_DELAY_MS: f64 = 100.0;
 /// Maximum distance in a machine, mm; the largest gantries have some tens of meters.
 const MAX_DISTANCE_MM: f64 = 1e5;
-/// Maximum current of a motor and of its friction, A.
-const MAX_CURRENT: f64 = 1e4;
-/// Range of the exponents of the friction law, min/m or min/rev. The decrease after breakaway can be steep; a rise
-/// steeper than e^V does not occur in bearings.
-const FRICTION_EXPONENT: (f64, f64) = (-100.0, 1.0);
 /// Maximum horizon of predictive control and maximum preview of T, position cycles.
 pub const MAX_HORIZON: i64 = 200;
 /// Range of the plant deviation factors.
 const DEVIATION: (f64, f64) = (0.1, 10.0);
 /// Maximum frequency of a filter, Hz: half the rate of the shortest velocity period.
 const MAX_FILTER_FREQUENCY_HZ: f64 = 500e3;
-/// Minimum of divisors and of other positive quantities.
-const POSITIVE: f64 = 1e-9;
 /// Maximum loop gain, in its unit.
 const MAX_GAIN: f64 = 1e9;
 /// Maximum default tolerance of an action goal of a linear axis, mm.
@@ -40,16 +34,6 @@ const MAX_TOLERANCE_DEG: f64 = 1e6;
 const INTEGRAL_TIME_MS: (f64, f64) = (1e-3, 1e6);
 /// Maximum number of coefficients of R and of S; controllers of the order of the drive have fewer than ten.
 pub const MAX_RST_TERMS: usize = 32;
-
-/// Defines an amplitude of the friction law.
-const fn friction_current(key: &'static str) -> ParameterDefinition {
-    ParameterDefinition::number(key, "A", -MAX_CURRENT, MAX_CURRENT).of_axis()
-}
-
-/// Defines an exponent of the friction law.
-const fn friction_exponent(key: &'static str, unit: &'static str) -> ParameterDefinition {
-    ParameterDefinition::number(key, unit, FRICTION_EXPONENT.0, FRICTION_EXPONENT.1)
-}
 
 /// Defines a loop gain, settable at run time.
 const fn gain(key: &'static str, unit: &'static str) -> ParameterDefinition {
@@ -124,23 +108,27 @@ const fn coordinate(key: &'static str) -> ParameterDefinition {
 }
 
 /// Definitions of all parameters. A key has two definitions if its unit depends on the type of axis or motor.
-pub static DEFINITIONS: &[ParameterDefinition] =
-    &concatenate::<{ MACHINE.len() + NODE.len() }>(MACHINE, NODE);
+pub static DEFINITIONS: &[ParameterDefinition] = &concatenate::<
+    { MACHINE.len() + PLANT.len() + CONTROL.len() + NODE.len() },
+>([MACHINE, PLANT, CONTROL, NODE]);
 
-const fn concatenate<const N: usize>(
-    first: &[ParameterDefinition],
-    second: &[ParameterDefinition],
-) -> [ParameterDefinition; N] {
-    let mut all = [second[0]; N];
-    let mut index = 0;
-    while index < N {
-        all[index] = if index < first.len() { first[index] } else { second[index - first.len()] };
-        index += 1;
+const fn concatenate<const N: usize>(parts: [&[ParameterDefinition]; 4]) -> [ParameterDefinition; N] {
+    let mut all = [MACHINE[0]; N];
+    let (mut part, mut index, mut count) = (0, 0, 0);
+    while count < N {
+        if index < parts[part].len() {
+            all[count] = parts[part][index];
+            index += 1;
+            count += 1;
+        } else {
+            part += 1;
+            index = 0;
+        }
     }
     all
 }
 
-/// Parameters of the machine and its axes.
+/// Parameters of the machine.
 const MACHINE: &[ParameterDefinition] = &[
     // Machine.
     ParameterDefinition::new("machine", "", ParameterKind::Text).describe("Name of the machine."),
@@ -155,165 +143,28 @@ const MACHINE: &[ParameterDefinition] = &[
     // Kinematic chain workpiece-C-A-X/Y/Z-tool; coordinates in the machine frame with every axis at home.
     ParameterDefinition::number("kinematics.tool_length_mm", "mm", 0.0, MAX_DISTANCE_MM)
         .default(Number(0.0))
-        .describe("Tool length along -Z, from the point moved by X, Y and Z (the origin at home) to the tool tip."),
+        .describe(
+            "Tool length along -Z, from the point moved by X, Y and Z (the origin at home) to the tool tip.",
+        ),
     coordinate("kinematics.pivot_a_y_mm").describe("Y of the rotation axis of A, which is parallel to X."),
     coordinate("kinematics.pivot_a_z_mm").describe("Z of the rotation axis of A, which is parallel to X."),
-    coordinate("kinematics.pivot_c_x_mm").describe("X of the rotation axis of C, which is parallel to Z while A is at 0."),
-    coordinate("kinematics.pivot_c_y_mm").describe("Y of the rotation axis of C, which is parallel to Z while A is at 0."),
+    coordinate("kinematics.pivot_c_x_mm")
+        .describe("X of the rotation axis of C, which is parallel to Z while A is at 0."),
+    coordinate("kinematics.pivot_c_y_mm")
+        .describe("Y of the rotation axis of C, which is parallel to Z while A is at 0."),
     coordinate("kinematics.workpiece_x_mm").describe("X of the origin of the workpiece frame."),
     coordinate("kinematics.workpiece_y_mm").describe("Y of the origin of the workpiece frame."),
     coordinate("kinematics.workpiece_z_mm").describe("Z of the origin of the workpiece frame."),
     ParameterDefinition::number("contour_control.gain", "(m/min)/mm", 0.0, MAX_GAIN)
         .default(Number(0.0))
         .live()
-        .describe("Gain of cross-coupled control of the linear axes, feedback of the contour error; 0 disables it."),
-    // Axis and transmission.
-    ParameterDefinition::new("type", "", ParameterKind::Choice(&["linear", "rotary"]))
-        .of_axis()
-        .describe("Type of the axis: linear in meters or rotary in radians."),
-    ParameterDefinition::number("transmission.screw_lead_mm", "mm", 1e-3, 1e3)
-        .on(Linear)
-        .optional()
-        .describe("Lead of the ball screw, axis travel per motor revolution."),
-    ParameterDefinition::number("transmission.gear_ratio", "", 1e-3, 1e6)
-        .on(Rotary)
-        .optional()
-        .describe("Gear ratio, motor revolutions per axis revolution."),
-    ParameterDefinition::new("transmission.direct", "", ParameterKind::Flag)
-        .of_axis()
-        .optional()
-        .describe("Direct drive: a torque motor on a rotary axis, a linear motor on a linear axis."),
-    // Elastic transmission.
-    ParameterDefinition::number("transmission.stiffness_n_um", "N/µm", 1e-3, 1e6)
-        .on(Linear)
-        .optional()
-        .describe("Stiffness between motor and load along the axis; rigid if omitted."),
-    ParameterDefinition::number("transmission.stiffness_nm_rad", "N·m/rad", 1e-3, 1e12)
-        .on(Rotary)
-        .optional()
-        .describe("Torsional stiffness between motor and load at the axis; rigid if omitted."),
-    ParameterDefinition::number("transmission.damping_n_s_m", "N/(m/s)", 0.0, 1e9)
-        .on(Linear)
-        .default(Number(0.0))
-        .describe("Damping between motor and load along the axis; needs a stiffness."),
-    ParameterDefinition::number("transmission.damping_nm_s_rad", "N·m/(rad/s)", 0.0, 1e9)
-        .on(Rotary)
-        .default(Number(0.0))
-        .describe("Torsional damping between motor and load at the axis; needs a stiffness."),
-    ParameterDefinition::number("transmission.load_mass_kg", "kg", 1e-6, 1e6)
-        .on(Linear)
-        .optional()
-        .describe("Mass of the load behind the stiffness; at the motor it is a part of the inertia Jeq."),
-    ParameterDefinition::number("transmission.load_inertia_kg_m2", "kg·m²", 1e-9, 1e6)
-        .on(Rotary)
-        .optional()
-        .describe("Inertia of the load about the axis behind the stiffness; at the motor it is a part of the inertia Jeq."),
-    // Motor.
-    ParameterDefinition::number("motor.inertia_kg_m2", "kg·m²", POSITIVE, 1e3)
-        .driven_by(RotaryMotor)
-        .describe("Jeq, equivalent inertia at the motor shaft (Prévost eqs. 1 and 5)."),
-    ParameterDefinition::number("motor.mass_kg", "kg", 1e-6, 1e6)
-        .driven_by(LinearMotor)
-        .describe("Moving mass, in place of Jeq (Prévost eq. 1)."),
-    ParameterDefinition::number("motor.torque_constant_nm_a", "N·m/A", POSITIVE, 1e4)
-        .driven_by(RotaryMotor)
-        .describe("Kt, torque constant (Prévost eq. 1)."),
-    ParameterDefinition::number("motor.force_constant_n_a", "N/A", POSITIVE, 1e5)
-        .driven_by(LinearMotor)
-        .describe("Force constant, in place of Kt (Prévost eq. 1)."),
-    ParameterDefinition::number("motor.emf_constant_v_s_rad", "V·s/rad", 0.0, 1e4)
-        .driven_by(RotaryMotor)
-        .describe("Ke, back-EMF constant (Prévost eq. 1)."),
-    ParameterDefinition::number("motor.emf_constant_v_s_m", "V·s/m", 0.0, 1e5)
-        .driven_by(LinearMotor)
-        .describe("Ke, back-EMF constant (Prévost eq. 1)."),
-    ParameterDefinition::number("motor.resistance_ohm", "Ω", 0.0, 1e4)
-        .of_axis()
-        .describe("R, winding resistance (Prévost eq. 1)."),
-    ParameterDefinition::number("motor.inductance_mh", "mH", 1e-6, 1e5)
-        .of_axis()
-        .describe("L, winding inductance (Prévost eq. 1)."),
-    ParameterDefinition::number("motor.max_current_a", "A", POSITIVE, MAX_CURRENT)
-        .of_axis()
-        .describe("imax, current setpoint limit."),
-    ParameterDefinition::number("motor.max_voltage_v", "V", POSITIVE, 1e5)
-        .of_axis()
-        .describe("umax, motor voltage limit."),
-    ParameterDefinition::number("motor.max_speed_rpm", "rpm", 1e-6, 1e6)
-        .driven_by(RotaryMotor)
-        .describe("Maximum motor speed, limit of the position controller output; velocity feedforward is added after the limit."),
-    ParameterDefinition::number("motor.max_speed_m_min", "m/min", 1e-6, 1e5)
-        .driven_by(LinearMotor)
-        .describe("Maximum motor speed, limit of the position controller output; velocity feedforward is added after the limit."),
-    // Friction.
-    friction_current("friction.a")
-        .describe("Amplitude a of the friction law a·exp(b·V) + c·exp(d·V) (Prévost eq. 3)."),
-    friction_exponent("friction.b", "min/m")
-        .on(Linear)
-        .describe("Exponent b of the friction law, V in m/min (Prévost eq. 3)."),
-    friction_exponent("friction.b", "min/rev")
-        .on(Rotary)
-        .describe("Exponent b of the friction law, V in rev/min of the axis (Prévost eq. 3)."),
-    friction_current("friction.c")
-        .describe("Amplitude c of the friction law; a + c, the friction at standstill, must not be negative (Prévost eq. 3)."),
-    friction_exponent("friction.d", "min/m")
-        .on(Linear)
-        .describe("Exponent d of the friction law, V in m/min (Prévost eq. 3)."),
-    friction_exponent("friction.d", "min/rev")
-        .on(Rotary)
-        .describe("Exponent d of the friction law, V in rev/min of the axis (Prévost eq. 3)."),
-    ParameterDefinition::number("friction.i0", "A", 0.0, MAX_CURRENT)
-        .of_axis()
-        .describe("Breakaway current i0, bound of the static friction (Prévost eq. 3)."),
-    ParameterDefinition::number("friction.stribeck", "A", 0.0, MAX_CURRENT)
-        .of_axis()
-        .default(Number(0.0))
-        .describe("Amplitude s of the Stribeck term s·exp(−(V/Vs)²), which is added to the friction law."),
-    ParameterDefinition::number("friction.stribeck_velocity_m_min", "m/min", 1e-6, 1e3)
-        .on(Linear)
-        .default(Number(0.1))
-        .describe("Velocity Vs of the Stribeck term."),
-    ParameterDefinition::number("friction.stribeck_velocity_rpm", "rpm", 1e-6, 1e3)
-        .on(Rotary)
-        .default(Number(0.1))
-        .describe("Velocity Vs of the Stribeck term, of the axis."),
-    ParameterDefinition::number("friction.viscous", "A/(m/min)", 0.0, MAX_CURRENT)
-        .on(Linear)
-        .default(Number(0.0))
-        .describe("Viscous friction v·V, which is added to the friction law."),
-    ParameterDefinition::number("friction.viscous", "A/rpm", 0.0, MAX_CURRENT)
-        .on(Rotary)
-        .default(Number(0.0))
-        .describe("Viscous friction v·V, which is added to the friction law, V in rev/min of the axis."),
-    ParameterDefinition::number("friction.presliding_stiffness_n_um", "N/µm", 0.0, 1e6)
-        .on(Linear)
-        .default(Number(0.0))
-        .describe("Stiffness σ0 of the friction before the axis slides (LuGre model), along the axis; 0: friction without presliding."),
-    ParameterDefinition::number("friction.presliding_stiffness_nm_rad", "N·m/rad", 0.0, 1e12)
-        .on(Rotary)
-        .default(Number(0.0))
-        .describe("Stiffness σ0 of the friction before the axis slides (LuGre model), at the axis; 0: friction without presliding."),
-    ParameterDefinition::number("friction.presliding_damping_n_s_m", "N/(m/s)", 0.0, 1e9)
-        .on(Linear)
-        .default(Number(0.0))
-        .describe("Damping σ1 of the friction before the axis slides (LuGre model), along the axis; needs a presliding stiffness."),
-    ParameterDefinition::number("friction.presliding_damping_nm_s_rad", "N·m/(rad/s)", 0.0, 1e9)
-        .on(Rotary)
-        .default(Number(0.0))
-        .describe("Damping σ1 of the friction before the axis slides (LuGre model), at the axis; needs a presliding stiffness."),
-    // Gravity.
-    ParameterDefinition::number("gravity.weight_n", "N", -1e6, 1e6)
-        .on(Linear)
-        .default(Number(0.0))
-        .describe("Net weight of a vertical axis after counterbalance; positive values oppose motion in the positive direction."),
-    ParameterDefinition::number("gravity.tilt_nm", "N·m", -1e6, 1e6)
-        .on(Rotary)
-        .default(Number(0.0))
-        .describe("Gravity torque amplitude k of a tilting axis, k·sin(position + phase)."),
-    ParameterDefinition::number("gravity.tilt_phase_deg", "°", -360.0, 360.0)
-        .on(Rotary)
-        .default(Number(0.0))
-        .describe("Phase of the gravity torque of a tilting axis."),
+        .describe(
+            "Gain of cross-coupled control of the linear axes, feedback of the contour error; 0 disables it.",
+        ),
+];
+
+/// Parameters of the controllers and limits of an axis.
+const CONTROL: &[ParameterDefinition] = &[
     // Control.
     ParameterDefinition::new("position_loop.controller", "", ParameterKind::Choice(&["cascade", "gpc", "rst"]))
         .of_axis()

@@ -1,0 +1,111 @@
+//! Validation of the plant parameters of an axis against each other: transmission, load and friction.
+
+use std::f64::consts::TAU;
+
+use super::build::{presliding_suffixes, transmission_suffixes};
+use super::check::{CrossChecks, DIRECT, missing};
+use super::definition::MotorKind;
+use super::error::{ConfigError, ValueSource};
+use super::layout::JointVariant;
+use super::machine::AxisKind;
+use super::value::{Value, number_text};
+use crate::units::{MILLIMETER, Rounded};
+
+impl CrossChecks<'_> {
+    pub(super) fn check_transmission(
+        &self,
+        joint: &JointVariant,
+        origin: &ValueSource,
+    ) -> Result<(), ConfigError> {
+        let drive = match joint.axis {
+            AxisKind::Linear => "screw_lead_mm",
+            AxisKind::Rotary => "gear_ratio",
+        };
+        let name = &joint.name;
+        let drive = format!("{name}.transmission.{drive}");
+        let direct = format!("{name}.transmission.direct");
+        let is_direct = self.value(&direct) == Some(Value::Bool(true));
+        match (is_direct, self.entries.contains_key(&drive)) {
+            (true, true) => Err(self.rejection(
+                &[&drive, &direct],
+                format!("be the only transmission of {name}, found {drive} and {direct} = true"),
+            )),
+            (false, false) => Err(missing(
+                origin,
+                &format!("{name}.transmission"),
+                format!("expected {drive} or {direct} = true"),
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks that stiffness and load are given together, and that the motor has an inertia of its own.
+    pub(super) fn check_elasticity(
+        &self,
+        joint: &JointVariant,
+        origin: &ValueSource,
+    ) -> Result<(), ConfigError> {
+        let key = |suffix: &str| format!("{}.{suffix}", joint.name);
+        let [stiffness, damping, load] = transmission_suffixes(joint.axis).map(key);
+        let has = |key: &String| self.entries.contains_key(key);
+        let Some(load_inertia) = self.number(&load).filter(|_| has(&stiffness)) else {
+            return match (has(&stiffness), has(&load)) {
+                (true, false) => Err(missing(origin, &load, format!("expected it beside {stiffness}"))),
+                (false, true) => Err(missing(origin, &stiffness, format!("expected it beside {load}"))),
+                _ if self.number(&damping).is_some_and(|value| value > 0.0) => {
+                    Err(missing(origin, &stiffness, format!("expected it beside {damping}")))
+                }
+                _ => Ok(()),
+            };
+        };
+        let inertia_key = key(match joint.motor {
+            MotorKind::Rotary => "motor.inertia_kg_m2",
+            MotorKind::Linear => "motor.mass_kg",
+        });
+        let per_axis = match joint.axis {
+            _ if self.value(&key(DIRECT)) == Some(Value::Bool(true)) => Some(1.0),
+            AxisKind::Linear => {
+                self.number(&key("transmission.screw_lead_mm")).map(|lead| lead * MILLIMETER / TAU)
+            }
+            AxisKind::Rotary => self.number(&key("transmission.gear_ratio")).map(|ratio| 1.0 / ratio),
+        };
+        let (Some(inertia), Some(ratio)) = (self.number(&inertia_key), per_axis) else { return Ok(()) };
+        let most = inertia / (ratio * ratio);
+        if load_inertia < most {
+            return Ok(());
+        }
+        Err(self.rejection(
+            &[&load, &inertia_key],
+            format!(
+                "be below {}, which is {inertia_key} at the axis, found {load} = {}",
+                Rounded(most),
+                number_text(load_inertia)
+            ),
+        ))
+    }
+
+    pub(super) fn check_friction(
+        &self,
+        joint: &JointVariant,
+        origin: &ValueSource,
+    ) -> Result<(), ConfigError> {
+        let [stiffness, damping] = presliding_suffixes(joint.axis).map(|key| format!("{}.{key}", joint.name));
+        let is_given = |key: &str| self.number(key).is_some_and(|value| value > 0.0);
+        if is_given(&damping) && !is_given(&stiffness) {
+            return Err(missing(origin, &stiffness, format!("expected it above 0 beside {damping}")));
+        }
+        let a_key = format!("{}.friction.a", joint.name);
+        let c_key = format!("{}.friction.c", joint.name);
+        match (self.number(&a_key), self.number(&c_key)) {
+            (Some(a), Some(c)) if a + c < 0.0 => Err(self.rejection(
+                &[&a_key, &c_key],
+                format!(
+                    "keep a + c ≥ 0, the friction at standstill, found a = {} and c = {}",
+                    number_text(a),
+                    number_text(c)
+                ),
+            )),
+            _ => Ok(()),
+        }
+    }
+}
