@@ -69,6 +69,8 @@ def robot_description(urdf: str, hardware: str, controller: str) -> str:
         block = xml.fromstring(read_file("hardware", hardware))
     except xml.ParseError as error:
         raise RuntimeError(f"hardware:={hardware}: {error}") from error
+    if robot.find("ros2_control") is not None:
+        raise RuntimeError(f"urdf:={urdf}: it has an element <ros2_control>; hardware:= gives it in a file of its own")
     found = block.find("hardware")
     if block.tag != "ros2_control" or found is None:
         raise RuntimeError(f"hardware:={hardware}: no element <ros2_control> with <hardware>")
@@ -95,7 +97,7 @@ def start(context: LaunchContext) -> list[object]:
         Node(
             package="controller_manager",
             executable="ros2_control_node",
-            parameters=[argument["controllers"]],
+            parameters=[str(Path(argument["controllers"]).expanduser())],
             output="screen",
         ),
         Node(

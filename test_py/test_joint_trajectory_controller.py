@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Iterator
 from contextlib import ExitStack
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -124,6 +125,33 @@ def test_query_state_returns_the_setpoints_planned_at_a_time(drive: AxesClient) 
     assert states["psec", "x"][row] == pytest.approx(state["x"][0], abs=1e-15)
 
 
+def test_parameter_file_of_a_controller_is_accepted(tmp_path: Path) -> None:
+    file = tmp_path / "controllers.yaml"
+    file.write_text(
+        f"""
+controller_manager:
+  ros__parameters: {{update_rate: 500}}
+{NAME}:
+  ros__parameters:
+    joints: [x, y, z, a, c]
+    command_interfaces: [position]
+    state_interfaces: [position, velocity]
+    allow_partial_joints_goal: true
+    interpolate_from_desired_state: true
+    allow_integration_in_goal_trajectories: false
+    constraints:
+      goal_time: 0.25
+      y: {{trajectory: 0.05, goal: 0.003}}
+"""
+    )
+    arguments = ["--ros-args", "--params-file", str(file), "-r", f"__node:={NAME}", "-p", "time:=fast"]
+    with Node(arguments, name=f"/{NAME}") as process, AxesClient(process=process) as axes:
+        found = axes.get_parameters(["joints", "constraints.y.goal", "y.tolerances.path_mm", "goal_time_tolerance"])
+        assert found.pop("joints") == ["x", "y", "z", "a", "c"]
+        expected = {"constraints.y.goal": 0.003, "y.tolerances.path_mm": 50.0, "goal_time_tolerance": 0.25}
+        assert found == pytest.approx(expected)
+
+
 def test_parameters_are_accepted_under_their_names(drive: AxesClient) -> None:
     found = drive.get_parameters([*CONSTRAINTS, "x.tolerances.path_mm", "goal_time_tolerance"])
     assert found == pytest.approx(CONSTRAINTS | {"x.tolerances.path_mm": 4.0, "goal_time_tolerance": 0.5})
@@ -141,7 +169,9 @@ def test_parameters_are_accepted_under_their_names(drive: AxesClient) -> None:
             ["constraints.x.goal = -0.1", "must be 0 (no tolerance) or a positive number of m"],
         ),
         ("interpolation_method:=cubic", ["interpolation_method = cubic", "must be splines or none"]),
-        ("command_interfaces:=[position]", ["unknown parameter command_interfaces"]),
+        ("command_interfaces:=[velocity]", ["command_interfaces = [velocity]", "must be [position]"]),
+        ("allow_partial_joints_goal:=false", ["allow_partial_joints_goal = false", "must be true"]),
+        ("gains.x.p:=2.0", ["gains.x.p"]),
     ],
 )
 def test_other_values_and_parameters_are_rejected(parameter: str, words: list[str]) -> None:

@@ -64,3 +64,11 @@ def test_files_that_are_missing_or_no_hardware_are_rejected(tmp_path: Path):
     other.write_text("<robot/>")
     with pytest.raises(RuntimeError, match="no element <ros2_control> with <hardware>"):
         nodes(FILE, hardware=str(other))
+    other.write_text("<robot><ros2_control/></robot>")
+    with pytest.raises(RuntimeError, match=r"urdf:=.*other.xml: it has an element <ros2_control>"):
+        nodes(FILE, urdf=str(other))
+
+
+def test_controllers_file_may_be_in_the_home_directory():
+    [manager] = by_executable(nodes(FILE, controllers="~/controllers.yaml"))["ros2_control_node"]
+    assert Path(manager.files[0]) == Path.home() / "controllers.yaml"

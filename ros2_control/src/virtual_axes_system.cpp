@@ -29,11 +29,14 @@ const std::vector<std::string> PARAMETERS = {"machine", "controller", "joints", 
 
 const std::vector<std::string> CONTROLLERS = {"cascade", "gpc", "rst"};
 
-/// Returns a parameter of the `<hardware>` block, or an empty text.
+/// Returns a parameter of the `<hardware>` block without spaces around it, or an empty text.
 std::string parameter(const hardware_interface::HardwareInfo & info, const std::string & name)
 {
   const auto found = info.hardware_parameters.find(name);
-  return found == info.hardware_parameters.end() ? "" : found->second;
+  const std::string value = found == info.hardware_parameters.end() ? "" : found->second;
+  const char * spaces = " \t\r\n";
+  const std::size_t start = value.find_first_not_of(spaces);
+  return start == std::string::npos ? "" : value.substr(start, value.find_last_not_of(spaces) + 1 - start);
 }
 
 }  // namespace
@@ -93,6 +96,9 @@ CallbackReturn VirtualAxesSystem::on_init(const InitParams & params)
     if (!controller_.empty() && !is_known) {
       throw std::invalid_argument("parameter controller is " + controller_ + "; allowed: " + list_of(CONTROLLERS));
     }
+    if (info.joints.empty()) {
+      throw std::invalid_argument("the hardware has no joints; allowed: at least one, with the command interface position");
+    }
     const SteppedAxes axes(machine_, controller_);
     std::vector<std::string> names;
     for (const auto & joint : info.joints) {
@@ -149,6 +155,13 @@ CallbackReturn VirtualAxesSystem::on_activate(const rclcpp_lifecycle::State &)
 CallbackReturn VirtualAxesSystem::on_deactivate(const rclcpp_lifecycle::State &)
 {
   is_active_ = false;
+  try {
+    axes_->rest();
+    set_states();
+  } catch (const std::exception & error) {
+    RCLCPP_ERROR(get_logger(), "%s", error.what());
+    return CallbackReturn::ERROR;
+  }
   return CallbackReturn::SUCCESS;
 }
 
@@ -185,6 +198,7 @@ return_type VirtualAxesSystem::read(const rclcpp::Time &, const rclcpp::Duration
     axes_->advance(period.nanoseconds());
     set_states();
   } catch (const std::exception & error) {
+    is_active_ = false;
     RCLCPP_ERROR(get_logger(), "%s", error.what());
     return return_type::ERROR;
   }
@@ -202,6 +216,7 @@ return_type VirtualAxesSystem::write(const rclcpp::Time &, const rclcpp::Duratio
     }
     axes_->command(commands_);
   } catch (const std::exception & error) {
+    is_active_ = false;
     RCLCPP_ERROR(get_logger(), "%s", error.what());
     return return_type::ERROR;
   }

@@ -135,7 +135,11 @@ Motion run(std::int64_t period_ns)
     }
     require(write(system, now, period_ns) == return_type::OK, "write");
   }
+  require(system.get_state("x/velocity") != 0.0, "the axis moves");
+  const double position = system.get_state("x/position");
   require(system.on_deactivate(State()) == CallbackReturn::SUCCESS, "on_deactivate");
+  require(system.get_state("x/velocity") == 0.0, "an axis is at rest after on_deactivate");
+  require(system.get_state("x/position") == position, "an axis keeps its position in on_deactivate");
   require(system.on_cleanup(State()) == CallbackReturn::SUCCESS, "on_cleanup");
   return motion;
 }
@@ -219,6 +223,10 @@ void errors()
   info.joints.push_back(info.joints[0]);
   rejected(info);
   info = mill();
+  info.joints.clear();
+  rejected(info);
+  info = mill();
+  info.hardware_parameters["machine"] = "\n  mikron_ucp710 ";
   info.hardware_parameters["controler"] = "gpc";
   VirtualAxesSystem system;
   start(system, info);

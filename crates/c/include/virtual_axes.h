@@ -220,7 +220,8 @@ uint64_t va_current_period_ns(const struct VaMachine *machine);
  * Sets a parameter and keeps the state (bumpless transfer); `name` and the unit are those of the machine file, as
  * `x.position_loop.gain`, and `value` is a text in YAML.
  *
- * Periods and the set of axes cannot change.
+ * Periods and the axes, their number, order and types, cannot change. Parameters that need each other, as stiffness and
+ * load mass of an elastic axis, are given in the machine file: one alone is an error.
  *
  * # Safety
  * `machine` is null or a machine of this library, `name` and `value` are null or texts that end with a null character.
@@ -284,12 +285,13 @@ enum VaStatus va_signals(const struct VaMachine *machine, size_t axis, struct Va
 enum VaStatus va_save(const struct VaMachine *machine, struct VaState **state);
 
 /**
- * Returns to a saved state, with the parameters of that time; the state can be used again.
+ * Returns to a saved state, with the parameters, loads and preview of that time; the state can be used again.
  *
  * # Safety
  * `machine` is null or a machine of this library, `state` null or a state of this library.
  */
-enum VaStatus va_restore(struct VaMachine *machine, const struct VaState *state);
+enum VaStatus va_restore(struct VaMachine *machine,
+                         const struct VaState *state);
 
 /**
  * Destroys a state; null is allowed.
@@ -393,6 +395,8 @@ enum VaStatus va_set_preview(struct VaMachine *machine,
 
 /**
  * Puts the axes at rest at `positions`, m or rad, one per axis, or at home if it is null, at time 0.
+ *
+ * Loads and preview are removed, parameters kept.
  *
  * # Safety
  * `machine` is null or a machine of this library, `positions` null or a pointer to `count` numbers.

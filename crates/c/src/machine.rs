@@ -36,6 +36,16 @@ impl VaMachine {
     pub(crate) fn axis_count(&self) -> usize {
         self.names.len()
     }
+
+    /// Returns true if `config` has the same axes: names, order and types.
+    fn has_axes_of(&self, config: &MachineConfig) -> bool {
+        let own = self.names.iter().zip(&self.is_rotary);
+        let names = || config.axes().iter().map(|axis| (axis.name(), axis.kind() != AxisKind::Linear));
+        self.axis_count() == names().count()
+            && own
+                .zip(names())
+                .all(|((name, rotary), other)| (name.to_bytes(), *rotary) == (other.0.as_bytes(), other.1))
+    }
 }
 
 pub(crate) fn discretize(config: &MachineConfig) -> Result<Arc<MachineParameters>, BorderError> {
@@ -162,7 +172,8 @@ pub unsafe extern "C" fn va_current_period_ns(machine: *const VaMachine) -> u64 
 /// Sets a parameter and keeps the state (bumpless transfer); `name` and the unit are those of the machine file, as
 /// `x.position_loop.gain`, and `value` is a text in YAML.
 ///
-/// Periods and the set of axes cannot change.
+/// Periods and the axes, their number, order and types, cannot change. Parameters that need each other, as stiffness and
+/// load mass of an elastic axis, are given in the machine file: one alone is an error.
 ///
 /// # Safety
 /// `machine` is null or a machine of this library, `name` and `value` are null or texts that end with a null character.
@@ -176,7 +187,7 @@ pub unsafe extern "C" fn va_set_parameter(
         // SAFETY: the caller promises a machine and texts.
         let (machine, name, value) =
             unsafe { (reference_mut(machine, "machine")?, text(name, "name")?, text(value, "value")?) };
-        if name.contains('=') {
+        if name.is_empty() || name.contains('=') {
             return Err(BorderError::invalid(format!("parameter {name:?} is unknown")));
         }
         let assignment =
@@ -185,6 +196,11 @@ pub unsafe extern "C" fn va_set_parameter(
         let mut parameters = machine.parameters.clone();
         parameters.set_all(vec![assignment]).map_err(BorderError::invalid)?;
         let config = parameters.machine_config().map_err(BorderError::invalid)?;
+        if !machine.has_axes_of(&config) {
+            let reason =
+                format!("{name} = {value}: the axes of a machine cannot change; create another machine");
+            return Err(BorderError::invalid(reason));
+        }
         machine.machine.update_parameters(discretize(&config)?).map_err(BorderError::invalid)?;
         machine.parameters = parameters;
         Ok(())

@@ -42,7 +42,7 @@ pub unsafe extern "C" fn va_save(machine: *const VaMachine, state: *mut *mut VaS
     })
 }
 
-/// Returns to a saved state, with the parameters of that time; the state can be used again.
+/// Returns to a saved state, with the parameters, loads and preview of that time; the state can be used again.
 ///
 /// # Safety
 /// `machine` is null or a machine of this library, `state` null or a state of this library.

@@ -129,6 +129,8 @@ pub unsafe extern "C" fn va_set_preview(
 
 /// Puts the axes at rest at `positions`, m or rad, one per axis, or at home if it is null, at time 0.
 ///
+/// Loads and preview are removed, parameters kept.
+///
 /// # Safety
 /// `machine` is null or a machine of this library, `positions` null or a pointer to `count` numbers.
 #[unsafe(no_mangle)]

@@ -81,6 +81,7 @@ fn invalid_hardware_blocks_are_rejected_with_name_value_and_allowed_values() {
         "joint y has the command interfaces [velocity]; allowed: position alone",
         "joint z has the state interface acceleration; allowed: position, velocity, effort, current, following_error",
         "joint x is given twice; allowed: each joint once",
+        "the hardware has no joints; allowed: at least one",
         "parameter controler = gpc is not read; this plugin reads machine, controller, joints, joint_prefix",
         "command interface x/velocity is not available; allowed: x/position",
         "x.position_loop.rst.r is missing",

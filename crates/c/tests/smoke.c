@@ -66,6 +66,11 @@ static void bad_calls(VaMachine *machine) {
   check_error(va_set_parameter(machine, "x.position_loop.gian", "2"), VA_INVALID, "x.position_loop.gain");
   check_error(va_set_parameter(machine, "x.position_loop.gain", "-2"), VA_INVALID, "x.position_loop.gain");
   check_error(va_set_parameter(machine, "periods.position_ms", "3"), VA_INVALID, "periods");
+  check_error(va_set_parameter(machine, "", "2"), VA_INVALID, "parameter \"\" is unknown");
+  check_error(va_set_parameter(machine, "joints", "[y, x, z, a, c]"), VA_INVALID, "joints = [y, x, z, a, c]: the axes");
+  check_error(va_set_parameter(machine, "joints", "[x, y, z]"), VA_INVALID, "the axes of a machine cannot change");
+  CHECK(va_set_parameter(machine, "joints", "[x, y, z, a, c]") == VA_OK);
+  check_error(va_set_parameter(machine, "x.transmission.stiffness_n_um", "150"), VA_INVALID, "load_mass_kg");
   check_error(va_parameter(machine, "x.position_loop.gain", text, 1), VA_INVALID, "size");
   check_error(va_parameter(machine, "x.position_loop.gian", text, sizeof text), VA_INVALID, "unknown");
   check_error(va_save(machine, NULL), VA_NULL_POINTER, "state");

@@ -6,6 +6,7 @@
 //! | `constraints.JOINT.goal`, m or rad | `JOINT.tolerances.goal_mm` or `goal_deg` |
 //! | `constraints.goal_time`, s | `goal_time_tolerance` |
 //! | `constraints.stopped_velocity_tolerance`, m/s or rad/s | `stopped_velocity_tolerance` |
+//! | `command_interfaces`, `state_interfaces`, `allow_partial_joints_goal` and others | none: the value must describe this node |
 
 use super::check::Entries;
 use super::error::{ConfigError, ValueSource};
@@ -16,6 +17,51 @@ use crate::units::{DEGREE, MILLIMETER};
 
 /// First part of the aliases.
 const GROUP: &str = "constraints.";
+
+/// Parameter of the controller that this node cannot change: it is accepted with the value that describes this node.
+struct FixedParameter {
+    key: &'static str,
+    describes_node: fn(&Value) -> bool,
+    /// What the value must be, after "must".
+    allowed: &'static str,
+}
+
+/// Fixed parameters of the controller.
+const FIXED: &[FixedParameter] = &[
+    FixedParameter {
+        key: "command_interfaces",
+        describes_node: |value| are_among(value, &["position"]),
+        allowed: "be [position]: setpoints are positions",
+    },
+    FixedParameter {
+        key: "state_interfaces",
+        describes_node: |value| are_among(value, &["position", "velocity"]),
+        allowed: "be [position] or [position, velocity], the states of the axes",
+    },
+    FixedParameter {
+        key: "allow_partial_joints_goal",
+        describes_node: |value| *value == Value::Bool(true),
+        allowed: "be true: axes that a trajectory does not name continue",
+    },
+    FixedParameter {
+        key: "interpolate_from_desired_state",
+        describes_node: |value| *value == Value::Bool(true),
+        allowed: "be true: trajectories begin at the commanded state",
+    },
+    FixedParameter {
+        key: "allow_integration_in_goal_trajectories",
+        describes_node: |value| *value == Value::Bool(false),
+        allowed: "be false: every point of a trajectory has positions",
+    },
+];
+
+/// Returns true if `value` is a list of names, each one of `names`.
+fn are_among(value: &Value, names: &[&str]) -> bool {
+    match value {
+        Value::TextList(list) => !list.is_empty() && list.iter().all(|name| names.contains(&name.as_str())),
+        _ => false,
+    }
+}
 
 /// Parameter that an alias names.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,6 +96,24 @@ impl ParameterAlias {
 /// Returns true if `key` has the form of an alias.
 pub(super) fn is_alias(key: &str) -> bool {
     key.starts_with(GROUP)
+}
+
+/// Returns true if `key` is a fixed parameter of the controller with a value that describes this node.
+///
+/// # Errors
+///
+/// [`ConfigError::NotAllowed`] for another value.
+pub(super) fn describes_node(key: &str, value: &Value, at: &ValueSource) -> Result<bool, ConfigError> {
+    let Some(fixed) = FIXED.iter().find(|fixed| fixed.key == key) else { return Ok(false) };
+    if (fixed.describes_node)(value) {
+        return Ok(true);
+    }
+    Err(ConfigError::NotAllowed {
+        at: at.clone(),
+        key: key.to_owned(),
+        value: value.rounded(),
+        allowed: fixed.allowed.to_owned(),
+    })
 }
 
 /// Returns the parameter that the alias `key` names; `axis` returns the type of the axis of a joint.
@@ -190,6 +254,42 @@ mod tests {
             let error = set(&mut parameters, text).expect_err("must be rejected");
             assert!(error.contains(words), "{error}");
         }
+    }
+
+    #[test]
+    fn a_parameter_file_of_the_controller_is_accepted() {
+        let defaults = Parameters::embedded_default().expect("valid");
+        let mut parameters = defaults.clone();
+        let text = "joint_trajectory_controller:\n  ros__parameters:\n    joints: [x, y, z, a, c]\n    \
+                    command_interfaces: [position]\n    state_interfaces: [position, velocity]\n    \
+                    allow_partial_joints_goal: true\n    interpolate_from_desired_state: true\n    \
+                    allow_integration_in_goal_trajectories: false\n    constraints:\n      x: {goal: 0.002}\n";
+        let report = parameters
+            .overlay_yaml(text, "jtc.yaml", Some("/joint_trajectory_controller"))
+            .expect("describes this node");
+        assert!(!report.is_machine_replaced);
+        assert_eq!(parameters.get("x.tolerances.goal_mm"), Some(Value::Double(2.0)));
+        assert_eq!(parameters.machine_config().expect("valid"), defaults.machine_config().expect("valid"));
+
+        for (text, words) in [
+            ("command_interfaces:=[velocity]", "command_interfaces = [velocity]: must be [position]"),
+            ("state_interfaces:=[position, effort]", "must be [position] or [position, velocity]"),
+            ("state_interfaces:=[]", "state_interfaces"),
+            ("allow_partial_joints_goal:=false", "allow_partial_joints_goal = false: must be true"),
+            ("interpolate_from_desired_state:=1", "interpolate_from_desired_state = 1: must be true"),
+            ("allow_integration_in_goal_trajectories:=true", "must be false"),
+        ] {
+            let error = set(&mut parameters, text).expect_err(text);
+            assert!(error.contains(words), "{error}");
+        }
+    }
+
+    #[test]
+    fn joints_without_their_types_must_be_those_of_the_machine() {
+        let mut parameters = Parameters::embedded_default().expect("valid");
+        let text = "/**:\n  ros__parameters:\n    joints: [x, q]\n    constraints:\n      x: {goal: 0.01}\n";
+        let error = parameters.overlay_yaml(text, "jtc.yaml", None).expect_err("q has no type").to_string();
+        assert!(error.contains("q.type") && error.contains("must be a complete machine"), "{error}");
     }
 
     #[test]

@@ -134,8 +134,9 @@ impl Parameters {
     /// Sets the parameters of a ROS 2 parameter file for the node `node` (fully qualified, `/ns/name`). With `None`, the
     /// only section of the file applies, or the sections that match `/virtual_axes`.
     ///
-    /// Sections match by the rules of ROS 2 (`*`, `**`); later sections take precedence. A file with `machine` or
-    /// `joints` is a complete machine and replaces the present machine; the parameters of the node remain.
+    /// Sections match by the rules of ROS 2 (`*`, `**`); later sections take precedence. A file with `machine`, or with
+    /// `joints` and the type of one, is a complete machine and replaces the present machine; the parameters of the node
+    /// remain.
     ///
     /// # Errors
     ///
@@ -148,12 +149,12 @@ impl Parameters {
     ) -> Result<OverlayReport, ConfigError> {
         let source = ValueSource::file(source);
         let file = parameter_file::read(text, &source, node)?;
+        let has = |wanted: &dyn Fn(&str) -> bool| file.assignments.iter().any(|one| wanted(&one.key));
+        let has_joints = has(&|key| key == "joints");
         let report = OverlayReport {
             parameters: file.assignments.len(),
-            is_machine_replaced: file
-                .assignments
-                .iter()
-                .any(|assignment| matches!(assignment.key.as_str(), "machine" | "joints")),
+            is_machine_replaced: has(&|key| key == "machine")
+                || has_joints && has(&|key| key.ends_with(".type")),
             sections: file.matched,
             skipped: file.skipped,
         };
@@ -163,8 +164,9 @@ impl Parameters {
                 plain_definition(key).is_some_and(|definition| definition.scope == Scope::Node)
             });
         }
-        *self = Self::from_assignments(base, file.assignments, &source)
-            .map_err(|error| if report.is_machine_replaced { explain_replacement(error) } else { error })?;
+        let needs_machine = report.is_machine_replaced || has_joints;
+        *self = Self::from_parts(base, &self.layout, file.assignments, &source)
+            .map_err(|error| if needs_machine { explain_replacement(error) } else { error })?;
         Ok(report)
     }
 
@@ -246,6 +248,9 @@ impl Parameters {
         let (aliases, assignments): (Vec<_>, Vec<_>) =
             assignments.into_iter().partition(|assignment| aliases::is_alias(&assignment.key));
         for Assignment { key, value, source } in assignments {
+            if aliases::describes_node(&key, &value, &source)? {
+                continue;
+            }
             changed.push(key.clone());
             entries.insert(key, ParameterEntry { value, source });
         }
@@ -328,8 +333,8 @@ fn explain_replacement(error: ConfigError) -> ConfigError {
             at,
             key,
             wanted: format!(
-                "{wanted}; a file with `machine` or `joints` must be a complete machine, omit both to change \
-                 parameters of the present machine"
+                "{wanted}; a file with `machine` or other `joints` must be a complete machine, omit both to \
+                 change parameters of the present machine"
             ),
         },
         other => other,

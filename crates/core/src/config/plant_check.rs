@@ -74,14 +74,12 @@ impl CrossChecks<'_> {
         if load_inertia < most {
             return Ok(());
         }
-        Err(self.rejection(
-            &[&load, &inertia_key],
-            format!(
-                "be below {}, which is {inertia_key} at the axis, found {load} = {}",
-                Rounded(most),
-                number_text(load_inertia)
-            ),
-        ))
+        Err(ConfigError::NotAllowed {
+            at: self.entries.get(&load).map_or(origin, |entry| &entry.source).clone(),
+            key: load,
+            value: number_text(load_inertia),
+            allowed: format!("be below {}, which is {inertia_key} at the axis", Rounded(most)),
+        })
     }
 
     pub(super) fn check_friction(
