@@ -69,6 +69,9 @@ def test_files_that_are_missing_or_no_hardware_are_rejected(tmp_path: Path):
         nodes(FILE, urdf=str(other))
 
 
-def test_controllers_file_may_be_in_the_home_directory():
+def test_controllers_file_may_be_in_the_home_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    file = tmp_path / "controllers.yaml"
+    file.write_text("controller_manager: {ros__parameters: {update_rate: 500}}\n")
     [manager] = by_executable(nodes(FILE, controllers="~/controllers.yaml"))["ros2_control_node"]
-    assert Path(manager.files[0]) == Path.home() / "controllers.yaml"
+    assert Path(manager.files[0]) == file

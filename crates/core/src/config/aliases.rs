@@ -22,7 +22,7 @@ const GROUP: &str = "constraints.";
 struct FixedParameter {
     key: &'static str,
     describes_node: fn(&Value) -> bool,
-    /// What the value must be, after "must".
+    /// Rule for the value, to follow "must".
     allowed: &'static str,
 }
 
