@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from control_msgs.action import FollowJointTrajectory
 from lifecycle_msgs.msg import State, Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
+from rclpy.action import ActionClient
 from sensor_msgs.msg import JointState
 from virtual_axes.msg import TrajectoryResult as R
 
@@ -114,6 +116,25 @@ def test_states_and_transitions_are_the_standard_ones(manager: Manager) -> None:
     assert not manager.change("activate") and not manager.change(Transition.TRANSITION_CLEANUP)
     assert not manager.change(99) and not manager.change("launch")
     assert manager.state() == State.PRIMARY_STATE_UNCONFIGURED
+
+
+def test_first_request_of_a_new_client_is_served_at_once(process: Node, manager: Manager) -> None:
+    """The heartbeat that repeats a request which was sent before it was matched comes 3 s later."""
+    times: list[float] = []
+    for _ in range(5):
+        with AxesClient(process=process, connect=False, keep_samples=False) as client:
+            # Other endpoints make the discovery of the client longer.
+            client.in_executor(
+                lambda: [client.node.create_subscription(JointState, f"other_{n}", print, 10) for n in range(4)]
+            )
+            service = client.in_executor(lambda: client.node.create_client(GetState, f"{DEFAULT_NODE}/get_state"))
+            client.in_executor(lambda: ActionClient(client.node, FollowJointTrajectory, "other_action"))
+            client.wait_for(service.service_is_ready, 20, "service get_state")
+            begin = time.monotonic()
+            future = service.call_async(GetState.Request())
+            client.wait_for(future.done, 20, "response of get_state")
+            times.append(time.monotonic() - begin)
+    assert sorted(times)[2] < 1.5, times
 
 
 def test_the_life_of_a_node(process: Node, manager: Manager) -> None:

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use futures::StreamExt;
 use rustdds::{DomainParticipant, DomainParticipantStatusEvent, GUID, LostReason, StatusEvented};
 
+use tokio::sync::watch;
 use tracing::debug;
 
 use super::announcement_eviction::AnnouncementEviction;
@@ -85,8 +86,8 @@ impl MatchedSubscriptionTracker {
 pub(super) struct DiscoveryEvents {
     /// Participant that discovers.
     pub participant: DomainParticipant,
-    /// Topics whose matched subscriptions are tracked.
-    pub tracker: MatchedSubscriptionTracker,
+    /// Topics whose matched subscriptions are tracked; none before their publishers exist.
+    pub tracker: watch::Receiver<MatchedSubscriptionTracker>,
     /// Participants of this process.
     pub own: OwnParticipants,
     /// Counter of the discovered endpoints.
@@ -113,8 +114,8 @@ impl DiscoveryEvents {
                 event = events.next() => match event {
                     Some(DomainParticipantStatusEvent::RemoteReaderMatched { local_writer, .. }) => {
                         // The writer of a rotated topic is not in the list.
-                        if is_current() && !tracker.record_match(local_writer) {
-                            tracker.poll(&participant);
+                        if is_current() && !tracker.borrow().record_match(local_writer) {
+                            tracker.borrow().poll(&participant);
                         }
                     }
                     Some(DomainParticipantStatusEvent::RemoteWriterMatched { local_reader, remote_writer }) => {
@@ -134,7 +135,7 @@ impl DiscoveryEvents {
                     None => return,
                 },
                 _ = timer.tick() => if is_current() {
-                    tracker.poll(&participant);
+                    tracker.borrow().poll(&participant);
                 },
             }
         }

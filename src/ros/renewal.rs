@@ -82,8 +82,9 @@ pub(super) struct RenewalSettings {
 }
 
 /// Tasks that watch the discovery of one participant, aborted on drop.
-struct DiscoveryWatch {
+pub(super) struct DiscoveryWatch {
     _tasks: JoinSet<()>,
+    tracker: watch::Sender<MatchedSubscriptionTracker>,
     participants: RemoteParticipants,
     counter: Arc<EndpointCounter>,
     is_current: Arc<AtomicBool>,
@@ -97,17 +98,16 @@ struct Successor {
 }
 
 impl Renewal {
-    /// Creates the renewal of `participant`, and starts the tasks that watch its discovery.
+    /// Creates the renewal of the participant whose discovery `watch` watches; its publishers are those of `tracker`.
     ///
     /// `endpoints` are moved at a renewal, besides the topics that are passed to [`Self::run`].
     pub(super) fn new(
         settings: RenewalSettings,
-        participant: DomainParticipant,
+        watch: DiscoveryWatch,
         tracker: MatchedSubscriptionTracker,
         endpoints: Vec<Arc<dyn RenewableEndpoint>>,
     ) -> Self {
-        let watch = DiscoveryWatch::new(&settings, participant, tracker.clone());
-        watch.is_current.store(true, Ordering::Relaxed);
+        watch.tracker.send_replace(tracker.clone());
         settings.discovered.set(Arc::clone(&watch.counter));
         Renewal { settings, tracker, endpoints, watch, rest_since: None, not_before: None }
     }
@@ -215,8 +215,12 @@ impl Renewal {
             let context = self.settings.own.open_next().map_err(|error| error.to_string())?;
             let mut node = create_node(&context, &self.settings.args)?;
             endpoints.iter().try_for_each(|endpoint| endpoint.prepare(&mut node, &context))?;
-            let watch =
-                DiscoveryWatch::new(&self.settings, context.domain_participant(), self.tracker.clone());
+            let watch = DiscoveryWatch::new(
+                &self.settings.own,
+                &self.settings.args,
+                context.domain_participant(),
+                self.tracker.clone(),
+            );
             drop(gate);
             Ok(Successor { context, node, watch })
         })
@@ -262,29 +266,34 @@ impl Renewal {
 }
 
 impl DiscoveryWatch {
+    /// Starts the tasks for the first participant; it is the current one, without publishers.
+    pub(super) fn of_first(own: &OwnParticipants, args: &RosArgs, participant: DomainParticipant) -> Self {
+        let watch = Self::new(own, args, participant, MatchedSubscriptionTracker::default());
+        watch.is_current.store(true, Ordering::Relaxed);
+        watch
+    }
+
     /// Starts the tasks for `participant`, which is not the current one yet.
     fn new(
-        settings: &RenewalSettings,
+        own: &OwnParticipants,
+        args: &RosArgs,
         participant: DomainParticipant,
         tracker: MatchedSubscriptionTracker,
     ) -> Self {
+        let (tracker, tracked) = watch::channel(tracker);
         let mut tasks = JoinSet::new();
         let participants = RemoteParticipants::default();
         let (counter, is_current) = (Arc::<EndpointCounter>::default(), Arc::<AtomicBool>::default());
-        tasks.spawn(duplicate_node_name::watch(
-            &participant,
-            settings.args.node().clone(),
-            settings.own.clone(),
-        ));
+        tasks.spawn(duplicate_node_name::watch(&participant, args.node().clone(), own.clone()));
         let events = DiscoveryEvents {
             participant,
-            tracker,
-            own: settings.own.clone(),
+            tracker: tracked,
+            own: own.clone(),
             counter: Arc::clone(&counter),
             participants: participants.clone(),
             is_current: Arc::clone(&is_current),
         };
         tasks.spawn(events.run());
-        DiscoveryWatch { _tasks: tasks, participants, counter, is_current }
+        DiscoveryWatch { _tasks: tasks, tracker, participants, counter, is_current }
     }
 }

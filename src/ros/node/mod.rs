@@ -35,6 +35,7 @@ use super::participant::Participant;
 use super::participant::create_node;
 use super::recorder::{TopicRecorder, TopicRecording};
 use super::renewable::EndpointContext;
+use super::renewal::DiscoveryWatch;
 use super::security::Security;
 use super::service;
 use super::static_peers;
@@ -113,6 +114,7 @@ async fn serve(
     let mut node = create_node(&context, args)
         .map_err(|reason| NodeError::Node { name: args.node().to_string(), reason })?;
     let services = ParameterServices::new(&mut node, &context, args)?;
+    let discovery = DiscoveryWatch::of_first(participants, args, context.domain_participant());
     let mut gate = Some(gate);
     let (configured, mut managed) = if args.is_managed() {
         let mut managed = ManagedNode::start(&mut node, &context, args)?;
@@ -182,7 +184,7 @@ async fn serve(
     };
     tasks.spawn_log_output(rosout, log);
     let recording = recorder.start()?;
-    let discovered = tasks.spawn_discovery(tracker, rotated, node, context);
+    let discovered = tasks.spawn_discovery(discovery, tracker, rotated, node, context);
     tasks.spawn_clock_input(subscriptions.clock, clock_out);
     let action = tasks.spawn_trajectory_inputs(action, action_outputs, subscriptions.psec);
     let program = tasks.spawn_program_server(program, program_outputs);

@@ -42,7 +42,7 @@ use crate::ros::program::ProgramGoals;
 use crate::ros::recorder::{RecordingStatus, Tap};
 use crate::ros::remote_endpoints::DiscoveredEndpoints;
 use crate::ros::renewable::EndpointContext;
-use crate::ros::renewal::{Renewal, RenewalSettings};
+use crate::ros::renewal::{DiscoveryWatch, Renewal, RenewalSettings};
 use crate::ros::results::TrajectoryResults;
 use crate::ros::rtps::is_secured;
 use crate::ros::topic_writers::TopicWriters;
@@ -84,6 +84,7 @@ impl NodeTasks<'_> {
     /// of discovered endpoints.
     pub(super) fn spawn_discovery(
         &mut self,
+        watch: DiscoveryWatch,
         tracker: MatchedSubscriptionTracker,
         rotated: RotatedTopics,
         node: Node,
@@ -99,7 +100,7 @@ impl NodeTasks<'_> {
             discovered: discovered.clone(),
         };
         let (context, endpoints) = context.into_parts();
-        let renewal = Renewal::new(settings, context.domain_participant(), tracker, endpoints);
+        let renewal = Renewal::new(settings, watch, tracker, endpoints);
         let (range, participants) = (self.participants.range(), renewal.participants());
         let owner = RotationContext { node, context, range, participants, disposed: 0 };
         self.tasks.spawn(rotated.run(owner, renewal));
