@@ -134,7 +134,12 @@ impl CurrentFilters {
 
     /// Returns true if there is a filter.
     pub fn is_enabled(&self) -> bool {
-        self.first.enabled > 0.0 || self.second.enabled > 0.0
+        self.enabled().contains(&true)
+    }
+
+    /// Returns true for each filter that exists.
+    pub(crate) fn enabled(&self) -> [bool; 2] {
+        [&self.first, &self.second].map(|filter| filter.enabled > 0.0)
     }
 
     /// Returns the transfer function of both filters at q⁻¹ = `delay`.

@@ -138,9 +138,13 @@ impl LinearInnerLoops {
 
     fn transition_without_angle<const STATES: usize>(&self) -> DMatrix<f64> {
         let (transition, _) = self.state_space::<STATES>(self.ticks_per_velocity);
-        DMatrix::from_iterator(STATES, STATES, transition.iter().copied())
-            .remove_row(ANGLE)
-            .remove_column(ANGLE)
+        // A filter that is not enabled keeps its state.
+        let is_constant = |index: usize| {
+            let filter = (index + FILTER_STATES).checked_sub(STATES).map(|state| state / 2);
+            filter.is_some_and(|filter| STATES > ELASTIC_STATES && !self.filters.enabled()[filter])
+        };
+        let kept: Vec<usize> = (0..STATES).filter(|&index| index != ANGLE && !is_constant(index)).collect();
+        DMatrix::from_fn(kept.len(), kept.len(), |row, column| transition[(kept[row], kept[column])])
     }
 
     /// Returns the state after `ticks` under `setpoint` (Ω*, rad/s).
