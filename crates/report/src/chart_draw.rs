@@ -171,7 +171,8 @@ impl Chart {
         for (i, (panel, area)) in areas.iter().enumerate() {
             let label = (i + 1 == areas.len()).then(|| self.x.unit.label(&self.x.quantity));
             // Zero at the edge of the panel needs no line.
-            let zero = [area.horizontal, area.vertical].map(|scale| scale.extent.min < 0.0);
+            let has_zero = |axis: &ChartAxis, scale: Scale| scale.extent.min < 0.0 && !axis.is_logarithmic;
+            let zero = [has_zero(&self.x, area.horizontal), has_zero(&panel.y, area.vertical)];
             area.draw(&mut svg, label.as_deref(), &panel.y.unit.label(&panel.y.quantity), zero);
             shade(&mut svg, area, &self.bands, &self.x, false);
             shade(&mut svg, area, &panel.bands, &panel.y, true);

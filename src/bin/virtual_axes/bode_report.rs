@@ -77,8 +77,9 @@ fn chart(axis: &AxisLoops, title: &str, response: fn(&FrequencyResponse) -> &Vec
         panels,
     );
     if let Some(found) = axis.natural_frequencies {
-        chart.lines =
-            vec![Guide::new(found.antiresonance, "antiresonance"), Guide::new(found.resonance, "resonance")];
+        chart.lines = vec![Guide::new(found.antiresonance, ""), Guide::new(found.resonance, "")];
+        let [low, high] = [found.antiresonance, found.resonance];
+        chart.note = format!("vertical lines: antiresonance {low:.1} Hz, resonance {high:.1} Hz");
     }
     chart
 }
