@@ -112,13 +112,16 @@ fn report_has_bode_plots_of_each_axis() {
 
 #[test]
 fn unstable_loops_are_named_and_have_no_margins() {
-    let arguments = ["bode", "--axis", "x", "--set", "x.velocity_loop.gain=500"];
+    let all = ["bode", "--axis", "x", "--set", "x.velocity_loop.gain=500"];
+    let arguments = [&all[..], &["--loop", "velocity"]].concat();
     let table = printed(&arguments);
     assert!(table.starts_with("unstable: velocity loop of x"), "{table}");
     assert!(table.contains("no margins of velocity loop of x: the closed loop is unstable"), "{table}");
     let found = json(&[&arguments[..], &["--json"]].concat());
     let velocity = &found["axes"]["x"]["loops"]["velocity"];
     assert_eq!((&velocity["stable"], &velocity["margins"]), (&false.into(), &serde_json::Value::Null));
+    // The position loop has no prediction model then.
+    assert_rejected(&all, &["axis x", "the inner loops are unstable"]);
 }
 
 #[test]
