@@ -1,4 +1,4 @@
-//! Stability margins of the position loop: modulus, phase, gain and delay margin.
+//! Stability margins of control loops: modulus, phase, gain and delay margin.
 
 use std::f64::consts::PI;
 
