@@ -235,8 +235,9 @@ impl LoopResponse {
 
     fn closed_at(&self, angle: f64) -> Complex<f64> {
         let Transfer::Position { model, controller } = &self.transfer else {
-            // L/(1 + L) without overflow near a pole of L.
-            return (self.at(angle).inv() + 1.0).inv();
+            let l = self.at(angle);
+            // Neither form overflows near a pole of L or divides by a zero of L.
+            return if l.norm() < 1.0 { l / (l + 1.0) } else { (l.inv() + 1.0).inv() };
         };
         let delay = delay(angle);
         let characteristic = sum(&product(model.a(), controller.s()), &product(model.b(), controller.r()));

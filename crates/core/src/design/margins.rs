@@ -32,7 +32,7 @@ const BISECTION_STEPS: usize = 50;
 /// |L| beyond which a point counts as a pole of L, not as a crossover.
 const POLE_MAGNITUDE: f64 = 1e9;
 
-/// Stability margins of a stable loop L = B R / (A S), sampled every Tsp.
+/// Stability margins of a stable sampled loop L; that of the position loop is B R / (A S).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Margins {
     /// Modulus margin min |1 + L|, the distance of L from −1.

@@ -293,6 +293,16 @@ fn resonance_peak_is_the_largest_closed_response() {
 }
 
 #[test]
+fn closed_loop_is_0_at_a_zero_of_the_open_loop() {
+    // A low-pass filter has a double zero at the Nyquist frequency.
+    let (axis, periods) = x_axis(&["x.current_filter_1.type=low_pass"]);
+    let model = response(&axis, &periods, ControlLoop::Velocity);
+    let nyquist = model.nyquist_frequency();
+    assert_eq!((model.open(nyquist).norm(), model.closed(nyquist).norm()), (0.0, 0.0));
+    assert!(model.margins().is_ok_and(|found| found.margins.modulus > 0.3));
+}
+
+#[test]
 fn phases_are_continuous() {
     let values: Vec<Complex<f64>> =
         (0..100).map(|k| Complex::from_polar(1.0, -3.0 - 0.2 * f64::from(k))).collect();
