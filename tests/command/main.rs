@@ -1,5 +1,6 @@
 //! Tests of the command `virtual_axes` and of its input and output files.
 
+mod bode_command;
 mod command;
 mod command_campaign;
 mod command_common;

@@ -67,7 +67,7 @@ fn the_pages_have_every_parameter_of_the_schema_once_and_no_other() {
 }
 
 /// Commands whose output is documented in json.md, by section.
-const DOCUMENTED: [(&str, &[&[&str]]); 10] = [
+const DOCUMENTED: [(&str, &[&[&str]]); 11] = [
     (
         "run",
         &[
@@ -93,6 +93,7 @@ const DOCUMENTED: [(&str, &[&[&str]]); 10] = [
             &["tune", "x-there-and-back", "--controller", "cascade"],
         ],
     ),
+    ("bode", &[&["bode"]]),
     ("learn", &[&["learn", "ballbar", "--iterations", "1", "--on", "x.position_loop.gain=2"]]),
     ("robustness", &[&["robustness", "corner-90"]]),
     ("pose", &[&["pose", "--joints", "x=0.1"]]),

@@ -4,7 +4,7 @@ use super::html::run_class;
 use super::markers::Marker;
 use super::unit::DisplayUnit;
 
-/// A plot of pairs of values on linear axes.
+/// A plot of pairs of values on linear or logarithmic axes.
 ///
 /// Values are in SI units and are labeled in the unit of their axis; a [`DisplayUnit`] of size 1 shows them
 /// unchanged. Values that are not finite, or beyond ±1e12 of the unit, are omitted and break a line. Long
@@ -72,6 +72,8 @@ pub struct ChartAxis {
     pub unit: DisplayUnit,
     /// Range that is shown.
     pub range: AxisRange,
+    /// True for a logarithmic axis, on which values of 0 and below are omitted.
+    pub is_logarithmic: bool,
 }
 
 /// Range of an axis that is shown.
@@ -172,12 +174,17 @@ impl Panel {
 impl ChartAxis {
     /// Creates an axis that shows all values.
     pub fn new(quantity: impl Into<String>, unit: DisplayUnit) -> Self {
-        ChartAxis { quantity: quantity.into(), unit, range: AxisRange::All }
+        ChartAxis { quantity: quantity.into(), unit, range: AxisRange::All, is_logarithmic: false }
     }
 
     /// Extends the range to zero.
     pub fn with_zero(self) -> Self {
         ChartAxis { range: AxisRange::WithZero, ..self }
+    }
+
+    /// Makes the axis logarithmic.
+    pub fn logarithmic(self) -> Self {
+        ChartAxis { is_logarithmic: true, ..self }
     }
 
     /// Fixes the range, SI units.

@@ -44,9 +44,15 @@ const LABEL_WIDTH: f64 = 160.0;
 const LABEL_ROWS: usize = 3;
 
 impl ChartAxis {
-    /// Converts a value to the unit of the axis; returns `None` if it cannot be drawn.
+    /// Converts a value to the unit of the axis, or to its common logarithm on a logarithmic axis.
+    pub(super) fn coordinate(&self, value: f64) -> f64 {
+        let value = value / self.unit.size;
+        if self.is_logarithmic { value.log10() } else { value }
+    }
+
+    /// Converts a value to a coordinate of the axis; returns `None` if it cannot be drawn.
     pub(super) fn shown(&self, value: f64) -> Option<f64> {
-        Some(value / self.unit.size).filter(|v| is_drawable(*v))
+        Some(self.coordinate(value)).filter(|v| is_drawable(*v))
     }
 
     /// Returns the scale of the axis for `values`, SI units.
@@ -56,13 +62,16 @@ impl ChartAxis {
             AxisRange::Within(from, to) if from < to => self.shown(from).zip(self.shown(to)),
             _ => None,
         };
-        if let Some((min, max)) = fixed {
-            return Scale::within(Extent { min, max }, least, steps);
-        }
-        let extent = Extent::of(values.map(|v| v / self.unit.size));
-        let zero = (self.range == AxisRange::WithZero || extent.is_none()).then_some(0.0);
-        let extent = Extent::join(extent, Extent::of(zero)).unwrap_or(Extent { min: 0.0, max: 0.0 });
-        Scale::within(extent.at_least(least).with_margin(margin), least, steps)
+        let scale = match fixed {
+            Some((min, max)) => Scale::within(Extent { min, max }, least, steps),
+            None => {
+                let extent = Extent::of(values.map(|v| self.coordinate(v)));
+                let zero = (self.range == AxisRange::WithZero || extent.is_none()).then_some(0.0);
+                let extent = Extent::join(extent, Extent::of(zero)).unwrap_or(Extent { min: 0.0, max: 0.0 });
+                Scale::within(extent.at_least(least).with_margin(margin), least, steps)
+            }
+        };
+        if self.is_logarithmic { scale.of_logarithms() } else { scale }
     }
 }
 
@@ -162,7 +171,8 @@ impl Chart {
         for (i, (panel, area)) in areas.iter().enumerate() {
             let label = (i + 1 == areas.len()).then(|| self.x.unit.label(&self.x.quantity));
             // Zero at the edge of the panel needs no line.
-            let zero = [area.horizontal, area.vertical].map(|scale| scale.extent.min < 0.0);
+            let has_zero = |axis: &ChartAxis, scale: Scale| scale.extent.min < 0.0 && !axis.is_logarithmic;
+            let zero = [has_zero(&self.x, area.horizontal), has_zero(&panel.y, area.vertical)];
             area.draw(&mut svg, label.as_deref(), &panel.y.unit.label(&panel.y.quantity), zero);
             shade(&mut svg, area, &self.bands, &self.x, false);
             shade(&mut svg, area, &panel.bands, &panel.y, true);
@@ -264,8 +274,8 @@ impl Chart {
                 .series
                 .iter()
                 .map(|series| {
-                    let drawable = series.points.iter().filter_map(|point| self.shown(panel, *point));
-                    let heights = drawable.map(|[_, height]| height);
+                    let drawable = series.points.iter().filter(|point| self.shown(panel, **point).is_some());
+                    let heights = drawable.map(|[_, height]| *height);
                     let count = if series.style.is_points() {
                         format!(", {} points,", number(heights.clone().count() as f64, 0))
                     } else {
@@ -273,7 +283,7 @@ impl Chart {
                     };
                     match Extent::of(heights) {
                         Some(Extent { min, max }) => {
-                            let [min, max] = [min, max].map(|v| y.unit.format(v * y.unit.size));
+                            let [min, max] = [min, max].map(|v| y.unit.format(v));
                             format!("{}{count} from {min} to {max}", series.label)
                         }
                         None => format!("{}: no values", series.label),

@@ -1,4 +1,4 @@
-//! Plot area with two linear axes: grid, ticks and labels.
+//! Plot area with two axes: grid, ticks and labels.
 
 use super::decimate::PixelPoint;
 use super::scale::Scale;
@@ -51,11 +51,13 @@ impl PlotArea {
         svg.rectangle("area", [left, top], [right, bottom]);
         for (value, label) in self.vertical.ticks() {
             svg.line(class(value, zero[1]), [left, y(value)], [right, y(value)]);
-            svg.text("tick", [left - TICK_LEFT, y(value) + TEXT_MIDDLE], Anchor::End, &label);
+            if !label.is_empty() {
+                svg.text("tick", [left - TICK_LEFT, y(value) + TEXT_MIDDLE], Anchor::End, &label);
+            }
         }
         for (value, label) in self.horizontal.ticks() {
             svg.line(class(value, zero[0]), [x(value), top], [x(value), bottom]);
-            if x_label.is_some() {
+            if x_label.is_some() && !label.is_empty() {
                 svg.text("tick", [x(value), bottom + TICK_BELOW], Anchor::Middle, &label);
             }
         }

@@ -1,4 +1,4 @@
-//! Ranges of signals, and linear scales with round ticks.
+//! Ranges of signals, and linear and logarithmic scales with round ticks.
 
 use super::text;
 use super::unit::DisplayUnit;
@@ -122,11 +122,13 @@ impl RoundNumber {
     }
 }
 
-/// Linear scale with round ticks.
+/// Scale with round ticks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scale {
     pub extent: Extent,
     step: RoundNumber,
+    /// True if values are common logarithms.
+    has_logarithms: bool,
 }
 
 impl Scale {
@@ -134,17 +136,17 @@ impl Scale {
     pub(super) fn within(extent: Extent, least_range: f64, count: f64) -> Scale {
         // A range below the resolution of f64 would have repeated ticks.
         let extent = extent.at_least(least_range.max(extent.peak() * 1e-9));
-        Scale { extent, step: RoundNumber::up(extent.span() / count) }
+        Scale { extent, step: RoundNumber::up(extent.span() / count), has_logarithms: false }
     }
 
     /// Creates a scale of `extent` widened to end on ticks.
     pub(super) fn outward(extent: Extent, least_range: f64, count: f64) -> Scale {
-        let Scale { extent, step } = Scale::within(extent, least_range, count);
+        let Scale { extent, step, .. } = Scale::within(extent, least_range, count);
         // A value beyond a tick by rounding only does not add another tick.
         let slack = 1e-6;
         let min = step.times((extent.min / step.value() + slack).floor());
         let max = step.times((extent.max / step.value() - slack).ceil());
-        Scale { extent: Extent { min, max }, step }
+        Scale { extent: Extent { min, max }, step, has_logarithms: false }
     }
 
     /// Returns the distance of two ticks.
@@ -152,15 +154,44 @@ impl Scale {
         self.step.value()
     }
 
-    /// Returns the values of the ticks and their labels.
+    /// Returns the scale with ticks for values that are common logarithms.
+    pub(super) fn of_logarithms(self) -> Scale {
+        Scale { has_logarithms: true, ..self }
+    }
+
+    /// Returns the values of the ticks and their labels; ticks of a logarithmic scale between powers of ten have none,
+    /// except 2 and 5 if the range is short.
     pub(super) fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
+        if self.has_logarithms { self.logarithmic_ticks() } else { self.linear_ticks() }.into_iter()
+    }
+
+    fn linear_ticks(&self) -> Vec<(f64, String)> {
         let step = self.step;
         let first = (self.extent.min / step.value() - 1e-6).ceil();
         let count = ((self.extent.max / step.value() + 1e-6).floor() - first).max(0.0) as u32;
-        (0..=count).map(move |i| {
+        let tick = |i: u32| {
             let value = step.times(first + f64::from(i));
             (value, text::number(value, step.decimals()))
-        })
+        };
+        (0..=count).map(tick).collect()
+    }
+
+    fn logarithmic_ticks(&self) -> Vec<(f64, String)> {
+        /// Number of decades up to which 2 and 5 have labels.
+        const SHORT: f64 = 1.5;
+        let Extent { min, max } = self.extent;
+        let is_labeled =
+            |mantissa: u32| mantissa == 1 || self.extent.span() < SHORT && [2, 5].contains(&mantissa);
+        let tick = |exponent: i32, mantissa: u32| {
+            let power = RoundNumber { mantissa: 1.0, exponent };
+            let value = power.times(f64::from(mantissa));
+            let label =
+                if is_labeled(mantissa) { text::number(value, power.decimals()) } else { String::new() };
+            (value.log10(), label)
+        };
+        let ticks = (min.floor() as i32..=max.floor() as i32)
+            .flat_map(|exponent| (1..10).map(move |mantissa| tick(exponent, mantissa)));
+        ticks.filter(|(value, _)| (min - 1e-9..=max + 1e-9).contains(value)).collect()
     }
 
     /// Returns the function that maps the range to `from` … `to`, pixels.
@@ -189,6 +220,21 @@ mod tests {
         );
         assert_eq!(labels(0.0, 10.0, 10.0).len(), 11);
         assert_eq!(labels(0.0, 0.3, 3.0), ["0.0", "0.1", "0.2", "0.3"]);
+    }
+
+    #[test]
+    fn ticks_of_a_logarithmic_scale_are_at_all_digits_and_labeled_at_powers_of_ten() {
+        let scale = Scale::within(Extent { min: -1.0, max: 4000_f64.log10() }, 1e-3, 9.0).of_logarithms();
+        let ticks: Vec<(f64, String)> = scale.ticks().collect();
+        let labeled: Vec<&str> =
+            ticks.iter().map(|(_, label)| label.as_str()).filter(|l| !l.is_empty()).collect();
+        assert_eq!(labeled, ["0.1", "1", "10", "100", "1\u{202f}000"]);
+        // 9 in each of 4 decades, and 1000, 2000, 3000 and 4000.
+        assert_eq!(ticks.len(), 4 * 9 + 4);
+        assert!(ticks.windows(2).all(|pair| pair[0].0 < pair[1].0));
+        let short = Scale::within(Extent { min: 1.0, max: 2.0 }, 1e-3, 9.0).of_logarithms();
+        let labeled: Vec<String> = short.ticks().map(|(_, label)| label).filter(|l| !l.is_empty()).collect();
+        assert_eq!(labeled, ["10", "20", "50", "100"]);
     }
 
     #[test]

@@ -15,9 +15,9 @@ const LEAST_WIDTH: f64 = 1.0;
 /// distinguishes the classes without color.
 const EDGE: f64 = 2.0;
 
-/// Returns the ordered ends of an interval in the unit of its axis, which can be infinite; `None` for NaN.
-fn ends(band: &Band, axis: &ChartAxis) -> Option<[f64; 2]> {
-    let [from, to] = [band.from, band.to].map(|v| v / axis.unit.size);
+/// Returns the ordered ends of an interval, which can be infinite; `None` for NaN.
+fn ends(band: &Band) -> Option<[f64; 2]> {
+    let Band { from, to, .. } = *band;
     (!from.is_nan() && !to.is_nan()).then(|| [from.min(to), from.max(to)])
 }
 
@@ -41,7 +41,8 @@ pub(super) fn shade(svg: &mut Svg, frame: &PlotArea, bands: &[Band], axis: &Char
         let mut parts: Vec<[f64; 2]> = bands
             .iter()
             .filter(|band| (band.class, band.label.as_str()) == kind)
-            .filter_map(|band| ends(band, axis))
+            .filter_map(ends)
+            .map(|ends| ends.map(|end| axis.coordinate(end)))
             .filter(|[from, to]| *from <= max && *to >= min)
             .map(|ends| {
                 let [a, b] = ends.map(|end| pixel(end.clamp(min, max)));
@@ -82,7 +83,7 @@ pub(super) fn band_descriptions(bands: &[Band], axis: &ChartAxis) -> Vec<String>
         .into_iter()
         .map(|kind| {
             let mut same = bands.iter().filter(|band| (band.class, band.label.as_str()) == kind);
-            match (same.next().and_then(|band| ends(band, axis)), same.count()) {
+            match (same.next().and_then(ends), same.count()) {
                 (Some([from, to]), 0) => {
                     let [from, to] = [from, to].map(|end| describe_end(end, axis));
                     format!("{} from {from} to {to}", kind.1)
@@ -93,8 +94,7 @@ pub(super) fn band_descriptions(bands: &[Band], axis: &ChartAxis) -> Vec<String>
         .collect()
 }
 
-fn describe_end(end: f64, axis: &ChartAxis) -> String {
-    let value = end * axis.unit.size;
+fn describe_end(value: f64, axis: &ChartAxis) -> String {
     match axis.shown(value) {
         Some(_) => axis.unit.format(value),
         None => "beyond the plot".to_owned(),

@@ -169,7 +169,7 @@ pub fn run(arguments: &DesignArguments) -> Result<String, Box<dyn Error>> {
 }
 
 /// Returns the axes with these names in machine order; all axes if `names` is empty.
-fn selected_axes<'a>(
+pub fn selected_axes<'a>(
     axes: &'a [AxisConfig],
     names: &[String],
 ) -> Result<Vec<&'a AxisConfig>, Box<dyn Error>> {

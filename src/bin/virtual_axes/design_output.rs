@@ -186,7 +186,7 @@ pub fn object(machine: &str, method: &str, designs: &[AxisDesign]) -> Value {
         "machine": machine,
         "method": method,
         "axes": axes,
-        "worst": worst(designs).map(|worst| margins(&worst)),
+        "worst": worst(designs).map(|worst| margins_object(&worst)),
     })
 }
 
@@ -218,11 +218,12 @@ fn axis(design: &AxisDesign) -> Value {
         "t_first": rst.t_first(),
         "stable": design.margins.is_ok(),
         "poles": poles,
-        "margins": design.margins.as_ref().ok().map(margins),
+        "margins": design.margins.as_ref().ok().map(margins_object),
     })
 }
 
-fn margins(margins: &Margins) -> Value {
+/// Returns the margins as a JSON object.
+pub fn margins_object(margins: &Margins) -> Value {
     json!({
         "modulus": margins.modulus,
         "phase_deg": margins.phase / DEGREE,

@@ -5,6 +5,9 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
 
 mod axis;
+mod bode;
+mod bode_output;
+mod bode_report;
 mod campaign;
 mod check;
 mod design;
@@ -83,6 +86,8 @@ enum Command {
     Psec(psec::PsecArguments),
     /// Design position controllers and print polynomials, closed-loop poles and stability margins.
     Design(design::DesignArguments),
+    /// Print the margins of the current, velocity and position loops, and write their frequency responses.
+    Bode(bode::BodeArguments),
     /// Optimize the tuning of the position controllers for a path.
     Tune(Box<tune::TuneArguments>),
     /// Learn setpoints that compensate the repeatable errors of a motion, run after run.
@@ -192,6 +197,7 @@ fn run_command(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Run(arguments) => run::run(arguments),
         Command::Psec(arguments) => psec::run(arguments),
         Command::Design(arguments) => design::run(arguments),
+        Command::Bode(arguments) => bode::run(arguments),
         Command::Tune(arguments) => tune::run(arguments),
         Command::Learn(arguments) => learn::run(arguments),
         Command::Robustness(arguments) => robustness::run(arguments),

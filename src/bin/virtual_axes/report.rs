@@ -79,7 +79,7 @@ pub struct ReportMachine {
 }
 
 /// Returns what is needed to repeat the runs.
-fn provenance(machine: &ReportMachine) -> Vec<(String, String)> {
+pub fn provenance(machine: &ReportMachine) -> Vec<(String, String)> {
     let command: Vec<String> = std::env::args().skip(1).map(|argument| quoted(&argument)).collect();
     let file = match Parameters::builtin_text(&machine.source) {
         Ok(text) => Some(blake3::hash(text.as_bytes())),

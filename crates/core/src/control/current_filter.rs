@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use nalgebra::Complex;
+
 use crate::config::CurrentFilterConfig;
 use crate::simd::{SimdReal, soa_struct};
 
@@ -86,6 +88,21 @@ impl BiquadFilter {
         BiquadFilter { b0, b1, b2, a1, a2, enabled: 1.0 }
     }
 
+    /// Returns the transfer function at q⁻¹ = `delay`.
+    fn transfer(&self, delay: Complex<f64>) -> Complex<f64> {
+        let polynomial = |first: f64, second: f64, third: f64| (delay * third + second) * delay + first;
+        match self.enabled > 0.0 {
+            true => polynomial(self.b0, self.b1, self.b2) / polynomial(1.0, self.a1, self.a2),
+            false => 1.0.into(),
+        }
+    }
+
+    /// Returns the pole in the upper half plane, or the larger of two real poles; `None` without a filter.
+    fn pole(&self) -> Option<Complex<f64>> {
+        let root = Complex::new(self.a1 * self.a1 / 4.0 - self.a2, 0.0).sqrt();
+        (self.enabled > 0.0).then(|| root - self.a1 / 2.0)
+    }
+
     /// Returns the state in which the input and output remain `value`.
     fn at_rest(&self, value: f64) -> BiquadState {
         let second = (self.b2 - self.a2) * value;
@@ -117,7 +134,22 @@ impl CurrentFilters {
 
     /// Returns true if there is a filter.
     pub fn is_enabled(&self) -> bool {
-        self.first.enabled > 0.0 || self.second.enabled > 0.0
+        self.enabled().contains(&true)
+    }
+
+    /// Returns true for each filter that exists.
+    pub(crate) fn enabled(&self) -> [bool; 2] {
+        [&self.first, &self.second].map(|filter| filter.enabled > 0.0)
+    }
+
+    /// Returns the transfer function of both filters at q⁻¹ = `delay`.
+    pub(crate) fn transfer(&self, delay: Complex<f64>) -> Complex<f64> {
+        self.first.transfer(delay) * self.second.transfer(delay)
+    }
+
+    /// Returns one pole of each filter, in the upper half plane or real.
+    pub(crate) fn poles(&self) -> impl Iterator<Item = Complex<f64>> {
+        [&self.first, &self.second].into_iter().filter_map(BiquadFilter::pole)
     }
 
     /// Returns the state in which the setpoint remains `current`, A.

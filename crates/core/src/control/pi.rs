@@ -1,5 +1,7 @@
 //! PI controller with feedforward, output limit and anti-windup by conditional integration.
 
+use nalgebra::Complex;
+
 use crate::config::PiConfig;
 use crate::simd::{SimdReal, clamp_abs, soa_struct};
 
@@ -45,6 +47,12 @@ impl Pi {
     pub fn new(config: &PiConfig, period: f64, scale: f64, limit: f64) -> Self {
         let integral_gain = config.gain * period / config.integral_time;
         Pi { integral_gain, gain: (config.gain + integral_gain) * scale, scale, limit }
+    }
+
+    /// Returns the transfer function from error to output within the limit, (K + K T/Ti z/(z − 1)) scale, from
+    /// `increment` z − 1.
+    pub(crate) fn transfer(&self, increment: Complex<f64>) -> Complex<f64> {
+        increment.inv() * (self.integral_gain * self.scale) + self.gain
     }
 }
 

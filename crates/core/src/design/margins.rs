@@ -1,4 +1,4 @@
-//! Stability margins of the position loop: modulus, phase, gain and delay margin.
+//! Stability margins of control loops: modulus, phase, gain and delay margin.
 
 use std::f64::consts::PI;
 
@@ -15,6 +15,8 @@ const FIRST_ANGLE: f64 = 1e-7;
 const POINTS_PER_DECADE: f64 = 16.0;
 /// Frequencies in the linear part of the grid, up to the Nyquist frequency.
 const LINEAR_POINTS: usize = 192;
+/// Step of the linear part, rad per sample.
+const LINEAR_STEP: f64 = PI / LINEAR_POINTS as f64;
 /// Distance of poles of L from the unit circle, in steps of the linear part, below which the grid is refined near them.
 const REFINEMENT_DISTANCE: f64 = 4.0;
 /// Ratio of the distances of successive refined frequencies from the pole.
@@ -30,7 +32,7 @@ const BISECTION_STEPS: usize = 50;
 /// |L| beyond which a point counts as a pole of L, not as a crossover.
 const POLE_MAGNITUDE: f64 = 1e9;
 
-/// Stability margins of a stable loop L = B R / (A S), sampled every Tsp.
+/// Stability margins of a stable sampled loop L; that of the position loop is B R / (A S).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Margins {
     /// Modulus margin min |1 + L|, the distance of L from −1.
@@ -46,17 +48,41 @@ pub struct Margins {
     pub delay: f64,
 }
 
+/// Stability margins of a loop with the frequencies at which they are found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoopMargins {
+    /// Stability margins.
+    pub margins: Margins,
+    /// Frequency of the phase margin, at which |L| = 1, Hz; `None` if |L| is never 1.
+    pub gain_crossover: Option<f64>,
+    /// Frequency of the gain margin upwards, at which L is real and negative, Hz; `None` without this margin.
+    pub phase_crossover: Option<f64>,
+}
+
 /// Computes the stability margins of `model` controlled by `rst`.
 ///
 /// # Errors
 /// [`DesignError::Unstable`] with the pole of largest modulus, since an unstable loop has no margins;
 /// [`DesignError::NoPoles`] if the poles cannot be computed.
 pub fn margins(model: &PredictionModel, rst: &Rst) -> Result<Margins, DesignError> {
+    Ok(position_loop_margins(model, rst)?.margins)
+}
+
+/// Computes the stability margins of `model` controlled by `rst`, with their frequencies.
+///
+/// # Errors
+/// Those of [`margins`].
+pub(super) fn position_loop_margins(model: &PredictionModel, rst: &Rst) -> Result<LoopMargins, DesignError> {
     if !has_roots_within(&characteristic_polynomial(model, rst), 1.0 - STABILITY_MARGIN) {
         check_stable(model, rst)?;
     }
-    let l = OpenLoop { model, rst };
-    let samples: Vec<Sample> = grid(model, rst).into_iter().map(|angle| l.sample(angle)).collect();
+    Ok(loop_margins(&OpenLoop { model, rst }))
+}
+
+/// Computes the margins of a stable loop.
+pub(super) fn loop_margins(l: &impl LoopTransfer) -> LoopMargins {
+    let sample = |angle| Sample { angle, l: l.at(angle) };
+    let samples: Vec<Sample> = grid(&l.poles_near_circle()).into_iter().map(sample).collect();
     let mut found = Margins {
         modulus: f64::INFINITY,
         phase: f64::INFINITY,
@@ -64,38 +90,66 @@ pub fn margins(model: &PredictionModel, rst: &Rst) -> Result<Margins, DesignErro
         gain_reduction: 0.0,
         delay: f64::INFINITY,
     };
-    found.modulus = minimum(&samples, |angle| (l.at(angle) + 1.0).norm(), |s| (s.l + 1.0).norm());
+    let hertz = |angle: f64| angle / (2.0 * PI * l.period());
+    let (mut gain_crossover, mut phase_crossover) = (None, None);
+    found.modulus = minimum(&samples, |angle| (l.at(angle) + 1.0).norm(), |s| (s.l + 1.0).norm()).1;
     let magnitude = |angle| l.at(angle).norm().ln();
     for angle in crossings(&samples, magnitude, |s| s.l.norm().ln(), f64::INFINITY) {
         // Angle from −1 to L, against the rotation by a delay.
         let ahead = (-l.at(angle)).arg().rem_euclid(2.0 * PI);
-        found.phase = found.phase.min(ahead).min(2.0 * PI - ahead);
-        found.delay = found.delay.min(ahead / angle * model.period());
+        let rotation = ahead.min(2.0 * PI - ahead);
+        if rotation < found.phase {
+            (found.phase, gain_crossover) = (rotation, Some(hertz(angle)));
+        }
+        found.delay = found.delay.min(ahead / angle * l.period());
     }
-    let mut add_crossing = |l: f64| {
+    let mut add_crossing = |angle: f64, l: f64| {
         let factor = -1.0 / l;
-        if factor > 1.0 {
-            found.gain = found.gain.min(factor);
-        } else if factor > 1.0 / POLE_MAGNITUDE {
+        if factor > 1.0 && factor < found.gain {
+            (found.gain, phase_crossover) = (factor, Some(hertz(angle)));
+        } else if factor <= 1.0 && factor > 1.0 / POLE_MAGNITUDE {
             found.gain_reduction = found.gain_reduction.max(factor);
         }
     };
     for angle in crossings(&samples, |angle| (-l.at(angle)).arg(), |s| (-s.l).arg(), PI) {
-        add_crossing(l.at(angle).re);
+        add_crossing(angle, l.at(angle).re);
     }
     // L is real at both ends, without a change of sign.
-    add_crossing(l.at(PI).re);
+    add_crossing(PI, l.at(PI).re);
     if let Some(static_gain) = l.static_gain() {
         found.modulus = found.modulus.min((1.0 + static_gain).abs());
-        add_crossing(static_gain);
+        add_crossing(0.0, static_gain);
     }
-    Ok(found)
+    LoopMargins { margins: found, gain_crossover, phase_crossover }
 }
 
-/// Open loop L as a function of the frequency, rad per sample.
-struct OpenLoop<'a> {
-    model: &'a PredictionModel,
-    rst: &'a Rst,
+/// Returns frequency (rad per sample) and value of the largest magnitude of `f`, on the grid for the poles `near_circle`.
+pub(super) fn largest_magnitude(near_circle: &[Complex<f64>], f: impl Fn(f64) -> Complex<f64>) -> (f64, f64) {
+    let sample = |angle| Sample { angle, l: f(angle) };
+    let samples: Vec<Sample> = grid(near_circle).into_iter().map(sample).collect();
+    let (angle, negative) = minimum(&samples, |angle| -f(angle).norm(), |s| -s.l.norm());
+    (angle, -negative)
+}
+
+/// Transfer function L of an open loop, sampled every period.
+pub(super) trait LoopTransfer {
+    /// Returns L at a frequency, rad per sample.
+    fn at(&self, angle: f64) -> Complex<f64>;
+
+    /// Returns L at frequency 0; `None` if L contains an integrator.
+    fn static_gain(&self) -> Option<f64>;
+
+    /// Returns the sampling period, s.
+    fn period(&self) -> f64;
+
+    /// Returns poles of L, at least those close to the unit circle other than at 1.
+    fn poles_near_circle(&self) -> Vec<Complex<f64>>;
+}
+
+/// Open loop L of a position controller in RST form.
+pub(super) struct OpenLoop<'a> {
+    pub model: &'a PredictionModel,
+    pub rst: &'a Rst,
 }
 
 /// L at one frequency.
@@ -104,20 +158,14 @@ struct Sample {
     l: Complex<f64>,
 }
 
-impl OpenLoop<'_> {
+impl LoopTransfer for OpenLoop<'_> {
     fn at(&self, angle: f64) -> Complex<f64> {
-        // At π rounding of the sine would leave an imaginary part.
-        let delay = if angle == PI { (-1.0).into() } else { Complex::from_polar(1.0, -angle) };
+        let delay = delay(angle);
         let l = value(self.model.b(), delay) * value(self.rst.r(), delay)
             / (value(self.model.a(), delay) * value(self.rst.s(), delay));
         if l.is_finite() { l } else { f64::MAX.sqrt().into() }
     }
 
-    fn sample(&self, angle: f64) -> Sample {
-        Sample { angle, l: self.at(angle) }
-    }
-
-    /// Returns L at frequency 0; `None` if L contains an integrator.
     fn static_gain(&self) -> Option<f64> {
         let sum = |p: &[f64]| p.iter().sum::<f64>();
         let size = |p: &[f64]| p.iter().map(|c| c.abs()).sum::<f64>();
@@ -126,35 +174,48 @@ impl OpenLoop<'_> {
         let is_finite = denominator.abs() > INTEGRATOR_TOLERANCE * size(a) * size(s);
         is_finite.then(|| sum(self.model.b()) * sum(self.rst.r()) / denominator)
     }
+    fn period(&self) -> f64 {
+        self.model.period()
+    }
+
+    fn poles_near_circle(&self) -> Vec<Complex<f64>> {
+        let mut poles = Vec::new();
+        for polynomial in [self.model.a(), self.rst.s()] {
+            // The logarithmic part of the grid covers poles at angle 0.
+            let others = without_integrators(polynomial);
+            if !has_roots_within(&others, 1.0 - REFINEMENT_DISTANCE * LINEAR_STEP) {
+                poles.extend(roots(&others).into_iter().flatten());
+            }
+        }
+        poles
+    }
+}
+
+/// Returns q⁻¹ at a frequency, rad per sample.
+pub(super) fn delay(angle: f64) -> Complex<f64> {
+    // At π rounding of the sine would leave an imaginary part.
+    if angle == PI { (-1.0).into() } else { Complex::from_polar(1.0, -angle) }
 }
 
 /// Creates the frequency grid up to π, rad per sample, refined near poles of L close to the unit circle.
-fn grid(model: &PredictionModel, rst: &Rst) -> Vec<f64> {
-    let distance = PI / LINEAR_POINTS as f64;
+fn grid(poles: &[Complex<f64>]) -> Vec<f64> {
     let mut grid: Vec<f64> = (1..=LINEAR_POINTS).map(|i| PI * i as f64 / LINEAR_POINTS as f64).collect();
     let mut angle = FIRST_ANGLE;
-    while angle < distance {
+    while angle < LINEAR_STEP {
         grid.push(angle);
         angle *= 10_f64.powf(1.0 / POINTS_PER_DECADE);
     }
-    for polynomial in [model.a(), rst.s()] {
-        // The logarithmic part covers poles at angle 0.
-        let others = without_integrators(polynomial);
-        if has_roots_within(&others, 1.0 - REFINEMENT_DISTANCE * distance) {
+    for pole in poles {
+        let depth = (1.0 - pole.norm()).abs();
+        if depth > REFINEMENT_DISTANCE * LINEAR_STEP || pole.im < 0.0 || (pole.im == 0.0 && pole.re > 0.0) {
             continue;
         }
-        for pole in roots(&others).into_iter().flatten() {
-            let depth = (1.0 - pole.norm()).abs();
-            if depth > REFINEMENT_DISTANCE * distance || pole.im < 0.0 || (pole.im == 0.0 && pole.re > 0.0) {
-                continue;
-            }
-            let center = pole.arg();
-            let mut offset = depth.max(MIN_REFINEMENT);
-            grid.push(center);
-            while offset < distance {
-                grid.extend([center - offset, center + offset]);
-                offset *= REFINEMENT_RATIO;
-            }
+        let center = pole.arg();
+        let mut offset = depth.max(MIN_REFINEMENT);
+        grid.push(center);
+        while offset < LINEAR_STEP {
+            grid.extend([center - offset, center + offset]);
+            offset *= REFINEMENT_RATIO;
         }
     }
     grid.retain(|angle| (FIRST_ANGLE..=PI).contains(angle));
@@ -163,13 +224,14 @@ fn grid(model: &PredictionModel, rst: &Rst) -> Vec<f64> {
     grid
 }
 
-/// Returns the minimum of `f`, whose values at the samples are `sampled`.
-fn minimum(samples: &[Sample], f: impl Fn(f64) -> f64, sampled: impl Fn(&Sample) -> f64) -> f64 {
-    let mut minimum = samples.iter().map(&sampled).fold(f64::INFINITY, f64::min);
+/// Returns argument and value of the minimum of `f`, whose values at the samples are `sampled`.
+fn minimum(samples: &[Sample], f: impl Fn(f64) -> f64, sampled: impl Fn(&Sample) -> f64) -> (f64, f64) {
+    let smaller = |a: (f64, f64), b: (f64, f64)| if b.1 < a.1 { b } else { a };
+    let mut minimum = samples.iter().map(|s| (s.angle, sampled(s))).fold((0.0, f64::INFINITY), smaller);
     for triple in samples.windows(3) {
         if sampled(&triple[1]) <= sampled(&triple[0]).min(sampled(&triple[2])) {
             let angle = golden_section(&f, triple[0].angle, triple[2].angle);
-            minimum = minimum.min(f(angle));
+            minimum = smaller(minimum, (angle, f(angle)));
         }
     }
     minimum

@@ -100,13 +100,18 @@ fn eigenvalues(size: usize, first_row: impl Fn(usize) -> f64) -> Option<Vec<Comp
         0 => first_row(column),
         _ => f64::from(u8::from(row == column + 1)),
     });
-    if !companion.iter().all(|c| c.is_finite()) {
+    matrix_eigenvalues(companion)
+}
+
+/// Computes the eigenvalues of a square matrix of at least one row; `None` without convergence.
+pub(super) fn matrix_eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
+    if !matrix.iter().all(|c| c.is_finite()) {
         return None;
     }
-    let limit = ITERATIONS_PER_ROOT * size;
+    let limit = ITERATIONS_PER_ROOT * matrix.nrows();
     let schur = |matrix| Schur::try_new(matrix, f64::EPSILON, limit);
     // The QR iteration stalls on matrices such as that of zⁿ − 1; a Householder similarity transformation avoids it.
-    let schur = schur(companion.clone()).or_else(|| schur(householder_transformed(companion)))?;
+    let schur = schur(matrix.clone()).or_else(|| schur(householder_transformed(matrix)))?;
     Some(schur.complex_eigenvalues().iter().copied().collect())
 }
 

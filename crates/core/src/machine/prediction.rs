@@ -16,6 +16,8 @@ use super::AxisError;
 const MAX_GROWTH: f64 = 1e9;
 /// States of a rigid axis from one position cycle to the next: i, ω, the two integrals, and θ.
 const RIGID_STATES: usize = 5;
+/// Index of the state θ.
+const ANGLE: usize = 4;
 /// States of an elastic axis: wind-up and speed of the load in addition.
 const ELASTIC_STATES: usize = 7;
 /// States of the filters of the current setpoint, in addition to those of a rigid or elastic axis.
@@ -57,24 +59,24 @@ fn model_with_drive(
     periods: &Periods,
 ) -> Result<PredictionModel, AxisError> {
     let loops = LinearInnerLoops::new(axis, motor, transmission, periods)?;
-    let (poles, numerator) = match (transmission, loops.filters.is_enabled()) {
-        (None, false) => loops.realization::<RIGID_STATES>()?,
-        (Some(_), false) => loops.realization::<ELASTIC_STATES>()?,
-        (None, true) => loops.realization::<FILTERED_STATES>()?,
-        (Some(_), true) => loops.realization::<FILTERED_ELASTIC_STATES>()?,
+    let (poles, numerator) = match (loops.transmission.is_elastic(), loops.filters.is_enabled()) {
+        (false, false) => loops.realization::<RIGID_STATES>()?,
+        (true, false) => loops.realization::<ELASTIC_STATES>()?,
+        (false, true) => loops.realization::<FILTERED_STATES>()?,
+        (true, true) => loops.realization::<FILTERED_ELASTIC_STATES>()?,
     };
     let a = product(&[1.0, -1.0], &poles);
     Ok(PredictionModel::new(a, numerator, seconds(periods.position))?)
 }
 
 /// Inner loops without limits, motor and load.
-struct LinearInnerLoops {
-    motor: Motor,
-    transmission: Transmission,
+pub(super) struct LinearInnerLoops {
+    pub motor: Motor,
+    pub transmission: Transmission,
     feedback: PositionFeedback,
-    velocity: Pi,
-    filters: CurrentFilters,
-    current: Pi,
+    pub velocity: Pi,
+    pub filters: CurrentFilters,
+    pub current: Pi,
     ticks_per_position: u64,
     ticks_per_velocity: u64,
 }
@@ -83,7 +85,7 @@ struct LinearInnerLoops {
 const SVD_ITERATIONS: usize = 1000;
 
 impl LinearInnerLoops {
-    fn new(
+    pub fn new(
         axis: &AxisConfig,
         motor: &MotorConfig,
         transmission: Option<&TransmissionConfig>,
@@ -114,7 +116,7 @@ impl LinearInnerLoops {
 
     /// Computes denominator and numerator of the increments of θ.
     fn realization<const STATES: usize>(&self) -> Result<(Vec<f64>, Vec<f64>), DesignError> {
-        let (transition, input) = self.state_space::<STATES>();
+        let (transition, input) = self.state_space::<STATES>(self.ticks_per_position);
         // θ(k + 1) − θ(k) = C x(k) + D Ω*(k) has no integrator: it depends on all states but θ.
         let order = STATES - 1;
         let output = |state: &SVector<f64, STATES>| match (self.feedback, STATES) {
@@ -124,9 +126,31 @@ impl LinearInnerLoops {
         minimal_realization(&increment_markov_parameters(&transition, &input, output, 2 * order + 1), order)
     }
 
-    /// Returns the state after one position cycle under `setpoint` (Ω*, rad/s).
-    fn state_after_cycle<const STATES: usize>(
+    /// Returns the transition matrix of all states but θ over one velocity cycle with the velocity loop closed.
+    pub fn velocity_loop_transition(&self) -> DMatrix<f64> {
+        match (self.transmission.is_elastic(), self.filters.is_enabled()) {
+            (false, false) => self.transition_without_angle::<RIGID_STATES>(),
+            (true, false) => self.transition_without_angle::<ELASTIC_STATES>(),
+            (false, true) => self.transition_without_angle::<FILTERED_STATES>(),
+            (true, true) => self.transition_without_angle::<FILTERED_ELASTIC_STATES>(),
+        }
+    }
+
+    fn transition_without_angle<const STATES: usize>(&self) -> DMatrix<f64> {
+        let (transition, _) = self.state_space::<STATES>(self.ticks_per_velocity);
+        // A filter that is not enabled keeps its state.
+        let is_constant = |index: usize| {
+            let filter = (index + FILTER_STATES).checked_sub(STATES).map(|state| state / 2);
+            filter.is_some_and(|filter| STATES > ELASTIC_STATES && !self.filters.enabled()[filter])
+        };
+        let kept: Vec<usize> = (0..STATES).filter(|&index| index != ANGLE && !is_constant(index)).collect();
+        DMatrix::from_fn(kept.len(), kept.len(), |row, column| transition[(kept[row], kept[column])])
+    }
+
+    /// Returns the state after `ticks` under `setpoint` (Ω*, rad/s).
+    fn state_after<const STATES: usize>(
         &self,
+        ticks: u64,
         state: &SVector<f64, STATES>,
         setpoint: f64,
     ) -> SVector<f64, STATES> {
@@ -144,7 +168,7 @@ impl LinearInnerLoops {
         let mut velocity = PiState { integral: state[2], excess: 0.0 };
         let mut current = PiState { integral: state[3], excess: 0.0 };
         let mut current_setpoint = 0.0;
-        for tick in 0..self.ticks_per_position {
+        for tick in 0..ticks {
             if tick.is_multiple_of(self.ticks_per_velocity) {
                 let filter = |current| self.filters.update(&mut filters, current);
                 let error = setpoint - motor.speed;
@@ -163,13 +187,16 @@ impl LinearInnerLoops {
         SVector::from_iterator(rigid.into_iter().chain(elastic.into_iter().flatten()).chain(filters))
     }
 
-    /// Returns Φ and Γ of `x(k + 1) = Φ x(k) + Γ Ω*(k)` over one position cycle.
-    fn state_space<const STATES: usize>(&self) -> (SMatrix<f64, STATES, STATES>, SVector<f64, STATES>) {
+    /// Returns Φ and Γ of `x(k + 1) = Φ x(k) + Γ Ω*(k)` over `ticks`, a multiple of the velocity cycle.
+    fn state_space<const STATES: usize>(
+        &self,
+        ticks: u64,
+    ) -> (SMatrix<f64, STATES, STATES>, SVector<f64, STATES>) {
         let column = |k: usize| {
-            self.state_after_cycle(&SVector::from_fn(|row, _| if row == k { 1.0 } else { 0.0 }), 0.0)
+            self.state_after(ticks, &SVector::from_fn(|row, _| if row == k { 1.0 } else { 0.0 }), 0.0)
         };
         let columns: [_; STATES] = std::array::from_fn(column);
-        (SMatrix::from_columns(&columns), self.state_after_cycle(&SVector::zeros(), 1.0))
+        (SMatrix::from_columns(&columns), self.state_after(ticks, &SVector::zeros(), 1.0))
     }
 }
 

@@ -6,6 +6,7 @@ mod design_common;
 mod design_controllers;
 mod design_margins;
 mod design_poles;
+mod frequency_response;
 mod gpc;
 mod learning;
 mod predictive;
