@@ -7,18 +7,19 @@ use super::definition::MotorKind;
 use super::error::{ConfigError, ValueSource};
 use super::layout::JointVariant;
 use super::machine::{
-    AxisConfig, AxisKind, CurrentFilterConfig, DelaysConfig, DeviationConfig, FeedforwardConfig, GpcConfig,
-    KinematicsConfig, LimitsConfig, MachineConfig, Periods, PiConfig, PositionControllerConfig,
-    PositionFeedback, PositionLoopConfig, RstConfig,
+    AxisConfig, AxisKind, BacklashCompensationConfig, CurrentFilterConfig, DelaysConfig, DeviationConfig,
+    FeedforwardConfig, GpcConfig, KinematicsConfig, LimitsConfig, MachineConfig, Periods, PiConfig,
+    PositionControllerConfig, PositionFeedback, PositionLoopConfig, RstConfig,
 };
 use super::parameters::Parameters;
 use super::plant::{
-    FrictionConfig, GravityConfig, MotorConfig, PreslidingConfig, StribeckConfig, TransmissionConfig,
+    FrictionConfig, GravityConfig, MotorConfig, PreslidingConfig, StribeckConfig, StructureConfig,
+    TransmissionConfig,
 };
 use super::value::Value;
 use crate::units::{
-    DEGREE, METER_PER_MINUTE, MICROSECOND_NS, MILLIHENRY, MILLIMETER, MILLISECOND, MILLISECOND_NS,
-    NEWTON_PER_MICROMETER, POSITION_GAIN, REVOLUTION, RPM,
+    DEGREE, METER_PER_MINUTE, MICROMETER, MICROSECOND_NS, MILLIHENRY, MILLIMETER, MILLISECOND,
+    MILLISECOND_NS, NEWTON_PER_MICROMETER, POSITION_GAIN, REVOLUTION, RPM,
 };
 
 impl Parameters {
@@ -95,6 +96,38 @@ pub(super) fn transmission_suffixes(axis: AxisKind) -> [&'static str; 3] {
             "transmission.damping_nm_s_rad",
             "transmission.load_inertia_kg_m2",
         ],
+    }
+}
+
+/// Returns the key of the inertia of the structure, without the name of the axis.
+pub(super) fn structure_suffix(axis: AxisKind) -> &'static str {
+    match axis {
+        AxisKind::Linear => "structure.mass_kg",
+        AxisKind::Rotary => "structure.inertia_kg_m2",
+    }
+}
+
+/// Returns the key of the backlash, without the name of the axis.
+pub(super) fn backlash_suffix(axis: AxisKind) -> &'static str {
+    match axis {
+        AxisKind::Linear => "transmission.backlash_um",
+        AxisKind::Rotary => "transmission.backlash_deg",
+    }
+}
+
+/// Returns the key of the width of the backlash compensation, without the name of the axis.
+pub(super) fn compensation_suffix(axis: AxisKind) -> &'static str {
+    match axis {
+        AxisKind::Linear => "backlash_compensation.width_um",
+        AxisKind::Rotary => "backlash_compensation.width_deg",
+    }
+}
+
+/// Returns the unit of the width of a gap, m or rad.
+fn gap_unit(axis: AxisKind) -> f64 {
+    match axis {
+        AxisKind::Linear => MICROMETER,
+        AxisKind::Rotary => DEGREE,
     }
 }
 
@@ -181,6 +214,7 @@ impl AxisParameters<'_> {
                     "load" => PositionFeedback::Load,
                     _ => PositionFeedback::Motor,
                 },
+                backlash_compensation: self.backlash_compensation()?,
                 allow_unstable: self.set.flag(&self.key("position_loop.allow_unstable")),
             },
             velocity_loop: pi("velocity_loop")?,
@@ -291,7 +325,32 @@ impl AxisParameters<'_> {
             stiffness: stiffness * stiffness_unit(self.joint.axis) * ratio * ratio,
             damping: self.or_zero(damping) * ratio * ratio,
             load_inertia: self.number(load_inertia)? * ratio * ratio,
+            backlash: self.scaled(backlash_suffix(self.joint.axis), gap_unit(self.joint.axis))? / ratio,
+            load_friction: self.number("transmission.load_friction")?,
+            structure: self.structure(ratio)?,
         }))
+    }
+
+    /// Returns the structure in units of the motor; `None` without a frequency.
+    fn structure(&self, ratio: f64) -> Result<Option<StructureConfig>, ConfigError> {
+        let Ok(frequency) = self.number("structure.frequency_hz") else { return Ok(None) };
+        Ok(Some(StructureConfig {
+            inertia: self.number(structure_suffix(self.joint.axis))? * ratio * ratio,
+            frequency: frequency * TAU,
+            damping_ratio: self.number("structure.damping_ratio")?,
+            carries_motor: self.set.flag(&self.key("transmission.direct")),
+        }))
+    }
+
+    fn backlash_compensation(&self) -> Result<BacklashCompensationConfig, ConfigError> {
+        let kind = self.joint.axis;
+        Ok(BacklashCompensationConfig {
+            width: self.scaled(compensation_suffix(kind), gap_unit(kind))?,
+            velocity: match kind {
+                AxisKind::Linear => self.scaled("backlash_compensation.velocity_m_min", METER_PER_MINUTE)?,
+                AxisKind::Rotary => self.scaled("backlash_compensation.velocity_rpm", RPM)?,
+            },
+        })
     }
 
     /// Returns the presliding in units of the motor; `None` without a stiffness.

@@ -57,6 +57,7 @@ pub(super) fn check(
     for joint in &layout.joints {
         set.check_transmission(joint, origin)?;
         set.check_elasticity(joint, origin)?;
+        set.check_backlash(joint, origin)?;
         set.check_friction(joint, origin)?;
         set.check_travel_limits(joint)?;
         set.check_horizons(joint)?;

@@ -115,8 +115,19 @@ pub struct PositionLoopConfig {
     pub controller: PositionControllerConfig,
     /// Encoder of the position controller.
     pub feedback: PositionFeedback,
+    /// Compensation of the backlash.
+    pub backlash_compensation: BacklashCompensationConfig,
     /// True if an unstable closed loop is accepted.
     pub allow_unstable: bool,
+}
+
+/// Compensation of the backlash: an offset of the motor that changes its sign at each reversal of the setpoint.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct BacklashCompensationConfig {
+    /// Width of the compensated gap, m or rad of the axis; 0: no compensation.
+    pub width: f64,
+    /// Largest velocity of the offset, m/s or rad/s of the axis.
+    pub velocity: f64,
 }
 
 /// Encoder that a position controller reads. The velocity controller reads the motor.

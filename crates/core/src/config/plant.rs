@@ -1,7 +1,7 @@
 //! Typed configuration of the plant of an axis: transmission, motor, friction and gravity.
 
 /// Elastic transmission between motor and load, in units of the motor.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct TransmissionConfig {
     /// Stiffness, N·m/rad (N/m for a linear motor).
     pub stiffness: f64,
@@ -9,6 +9,25 @@ pub struct TransmissionConfig {
     pub damping: f64,
     /// Inertia of the load, kg·m² (kg for a linear motor); a part of [`MotorConfig::inertia`].
     pub load_inertia: f64,
+    /// Width of the gap between motor and load, rad (m for a linear motor).
+    pub backlash: f64,
+    /// Share of the friction that acts at the load, 0 … 1.
+    pub load_friction: f64,
+    /// Structure that carries the axis; `None` for a rigid one.
+    pub structure: Option<StructureConfig>,
+}
+
+/// Structure that carries an axis and vibrates along it, in units of the motor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StructureConfig {
+    /// Modal inertia, kg·m² (kg for a linear motor).
+    pub inertia: f64,
+    /// Natural angular frequency with the axis removed, rad/s.
+    pub frequency: f64,
+    /// Damping ratio with the axis removed.
+    pub damping_ratio: f64,
+    /// True if the moving part of the motor pushes against the structure, as in a direct drive.
+    pub carries_motor: bool,
 }
 
 /// Equivalent DC motor of the servo motor (Prévost eq. 1).

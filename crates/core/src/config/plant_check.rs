@@ -2,7 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use super::build::{presliding_suffixes, transmission_suffixes};
+use super::build::{
+    backlash_suffix, compensation_suffix, presliding_suffixes, structure_suffix, transmission_suffixes,
+};
 use super::check::{CrossChecks, DIRECT, missing};
 use super::definition::MotorKind;
 use super::error::{ConfigError, ValueSource};
@@ -80,6 +82,51 @@ impl CrossChecks<'_> {
             value: number_text(load_inertia),
             allowed: format!("be below {}, which is {inertia_key} at the axis", Rounded(most)),
         })
+    }
+
+    /// Checks that backlash, friction at the load and structure have a stiffness, and no presliding beside them.
+    pub(super) fn check_backlash(
+        &self,
+        joint: &JointVariant,
+        origin: &ValueSource,
+    ) -> Result<(), ConfigError> {
+        let key = |suffix: &str| format!("{}.{suffix}", joint.name);
+        let is_positive = |key: &String| self.number(key).is_some_and(|value| value > 0.0);
+        let [stiffness, _, _] = transmission_suffixes(joint.axis).map(key);
+        let [presliding, _] = presliding_suffixes(joint.axis).map(key);
+        let (frequency, inertia) = (key("structure.frequency_hz"), key(structure_suffix(joint.axis)));
+        let gap = [key(backlash_suffix(joint.axis)), key("transmission.load_friction")];
+        let present = gap.into_iter().chain([frequency.clone(), inertia.clone()]).filter(is_positive);
+        for key in present {
+            if !is_positive(&stiffness) {
+                return Err(missing(origin, &stiffness, format!("expected it beside {key}")));
+            }
+            if is_positive(&presliding) {
+                return Err(self.rejection(
+                    &[&key, &presliding],
+                    format!("not be above 0 both: {key} and {presliding}"),
+                ));
+            }
+        }
+        match (is_positive(&frequency), is_positive(&inertia)) {
+            (true, false) => Err(missing(origin, &inertia, format!("expected it beside {frequency}"))),
+            (false, true) => Err(missing(origin, &frequency, format!("expected it beside {inertia}"))),
+            _ => self.check_backlash_compensation(joint),
+        }
+    }
+
+    /// Checks that the position controller of a compensated backlash reads the motor.
+    fn check_backlash_compensation(&self, joint: &JointVariant) -> Result<(), ConfigError> {
+        let width = format!("{}.{}", joint.name, compensation_suffix(joint.axis));
+        let feedback = format!("{}.position_loop.feedback", joint.name);
+        let reads_load = self.value(&feedback) == Some(Value::Text("load".to_owned()));
+        match self.number(&width).is_some_and(|value| value > 0.0) && reads_load {
+            true => Err(self.rejection(
+                &[&width, &feedback],
+                format!("be {width} = 0 or {feedback} = motor: a scale at the load sees the backlash"),
+            )),
+            false => Ok(()),
+        }
     }
 
     pub(super) fn check_friction(

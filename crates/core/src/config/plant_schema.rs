@@ -66,6 +66,34 @@ pub(super) const PLANT: &[ParameterDefinition] = &[
         .on(Rotary)
         .optional()
         .describe("Inertia of the load about the axis behind the stiffness; at the motor it is a part of the inertia Jeq."),
+    ParameterDefinition::number("transmission.backlash_um", "µm", 0.0, 1e4)
+        .on(Linear)
+        .default(Number(0.0))
+        .describe("Width of the gap between motor and load along the axis; needs a stiffness."),
+    ParameterDefinition::number("transmission.backlash_deg", "°", 0.0, 10.0)
+        .on(Rotary)
+        .default(Number(0.0))
+        .describe("Width of the gap between motor and load at the axis; needs a stiffness."),
+    ParameterDefinition::number("transmission.load_friction", "", 0.0, 1.0)
+        .of_axis()
+        .default(Number(0.0))
+        .describe("Share of the friction that acts at the load, as guideways do; the rest acts at the motor; needs a stiffness."),
+    ParameterDefinition::number("structure.mass_kg", "kg", 1e-3, 1e9)
+        .on(Linear)
+        .optional()
+        .describe("Modal mass of the structure that carries the axis and vibrates along it; needs a frequency and a stiffness of the transmission."),
+    ParameterDefinition::number("structure.inertia_kg_m2", "kg·m²", 1e-6, 1e9)
+        .on(Rotary)
+        .optional()
+        .describe("Modal inertia of the structure that carries the axis and vibrates about it; needs a frequency and a stiffness of the transmission."),
+    ParameterDefinition::number("structure.frequency_hz", "Hz", 0.1, 1e4)
+        .of_axis()
+        .optional()
+        .describe("Natural frequency of the structure with the axis removed; the structure is rigid if omitted."),
+    ParameterDefinition::number("structure.damping_ratio", "", 0.0, 1.0)
+        .of_axis()
+        .default(Number(0.02))
+        .describe("Damping ratio of the structure with the axis removed."),
     // Motor.
     ParameterDefinition::number("motor.inertia_kg_m2", "kg·m²", POSITIVE, 1e3)
         .driven_by(RotaryMotor)

@@ -196,6 +196,26 @@ const CONTROL: &[ParameterDefinition] = &[
         .of_axis()
         .default(Text("motor"))
         .describe("Encoder of the position controller: at the motor (semi-closed loop), or at the load of an elastic transmission (closed loop)."),
+    ParameterDefinition::number("backlash_compensation.width_um", "µm", 0.0, 1e4)
+        .on(Linear)
+        .default(Number(0.0))
+        .live()
+        .describe("Step of the motor at a reversal of the setpoint that compensates a backlash of this width; 0: no compensation."),
+    ParameterDefinition::number("backlash_compensation.width_deg", "°", 0.0, 10.0)
+        .on(Rotary)
+        .default(Number(0.0))
+        .live()
+        .describe("Step of the motor at a reversal of the setpoint that compensates a backlash of this width, at the axis; 0: no compensation."),
+    ParameterDefinition::number("backlash_compensation.velocity_m_min", "m/min", 1e-6, 1e3)
+        .on(Linear)
+        .default(Number(0.1))
+        .live()
+        .describe("Largest velocity of the backlash compensation along the axis."),
+    ParameterDefinition::number("backlash_compensation.velocity_rpm", "rpm", 1e-6, 1e3)
+        .on(Rotary)
+        .default(Number(0.1))
+        .live()
+        .describe("Largest velocity of the backlash compensation, of the axis."),
     ParameterDefinition::new("position_loop.allow_unstable", "", ParameterKind::Flag)
         .of_axis()
         .default(Flag(false))

@@ -5,6 +5,7 @@
 //! (Prévost eq. 9). The PI controllers of velocity and current have an output limit and anti-windup; a change of the
 //! position controller is a bumpless transfer.
 
+mod backlash_compensation;
 mod bumpless_transfer;
 mod contour_error;
 mod current_filter;
@@ -13,6 +14,7 @@ mod position;
 mod rst;
 mod setpoint;
 
+pub use backlash_compensation::{BacklashCompensation, BacklashOffset};
 pub use bumpless_transfer::{BumplessTransfer, BumplessTransferState};
 pub use contour_error::{CONTOUR_AXES, CONTOUR_LOOKBACK, ContourVector, contour_error};
 pub use current_filter::{BiquadFilter, BiquadState, CurrentFilterState, CurrentFilters};

@@ -9,6 +9,7 @@
 //! ```
 
 mod elementary;
+mod event_driven;
 mod friction;
 mod friction_expansion;
 mod gravity;
@@ -18,6 +19,7 @@ mod presliding;
 mod response;
 mod transmission;
 
+pub use event_driven::{ContactState, EventDrivenTransmission};
 pub use friction::Friction;
 pub(crate) use friction_expansion::FrictionExpansion;
 pub use gravity::Gravity;
@@ -56,5 +58,17 @@ pub enum DriveError {
         period_s: f64,
         /// Frequency of the damped oscillation, Hz.
         frequency_hz: f64,
+    },
+    /// Backlash, friction at the load or a structure with oscillations that a current cycle does not resolve.
+    #[error(
+        "the transmission changes within {} s, too fast for the current cycle of {} s with backlash, friction at the load \
+         or a structure; reduce transmission.stiffness or transmission.damping, or shorten periods.current_us",
+        Rounded(*time_s), Rounded(*period_s)
+    )]
+    TooFast {
+        /// Period of the current loop, s.
+        period_s: f64,
+        /// Time constant of the fastest change, s.
+        time_s: f64,
     },
 }

@@ -2,12 +2,14 @@
 //!
 //! [`inner_loops`](super::inner_loops) runs the inner loops and the plant.
 
+use std::sync::Arc;
+
 use crate::config::{AxisConfig, Periods, PositionFeedback};
 use crate::control::{
-    CONTOUR_LOOKBACK, CurrentFilters, Delays, Feedforward, Pi, PiState, PositionController, PositionState,
-    SetpointHistory, SetpointWindow, TickDelay,
+    BacklashCompensation, BacklashOffset, CONTOUR_LOOKBACK, CurrentFilters, Delays, Feedforward, Pi, PiState,
+    PositionController, PositionState, SetpointHistory, SetpointWindow, TickDelay,
 };
-use crate::drive::{LoadState, MotorState, Plant};
+use crate::drive::{ContactState, EventDrivenTransmission, LoadState, MotorState, Plant};
 use crate::state_codec::StateCodec;
 use crate::units::seconds;
 
@@ -20,6 +22,8 @@ use super::{AxisError, AxisSample};
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisParameters {
     pub(super) loops: InnerLoops,
+    /// Transmission with backlash, friction at the load or a structure.
+    pub(super) event_driven: Option<Arc<EventDrivenTransmission>>,
     position: PositionController,
     controller: &'static str,
     feedforward: Feedforward,
@@ -27,6 +31,7 @@ pub struct AxisParameters {
     /// True if the axis is one of those of cross-coupled control.
     pub(super) has_contour_control: bool,
     delays: Delays,
+    backlash_compensation: BacklashCompensation,
     /// Weight of the wind-up in the angle that the position controller reads: 1 with an encoder at the load, else 0.
     wind_up_feedback: f64,
     position_delay: TickDelay,
@@ -93,6 +98,8 @@ impl AxisParameters {
                 filters: CurrentFilters::new(&axis.current_filters, seconds(periods.velocity)),
                 current: Pi::new(&axis.current_loop, tick, 1.0, motor.max_voltage),
             },
+            event_driven: EventDrivenTransmission::new(axis, tick)?.map(Arc::new),
+            backlash_compensation: BacklashCompensation::new(axis, seconds(periods.position)),
             position,
             controller,
             feedforward: Feedforward::new(
@@ -137,6 +144,8 @@ pub struct Axis {
     /// Part of cross-coupled control in the output of the position controller, rad/s of the motor; 0 between two
     /// position cycles.
     contour_offset: f64,
+    /// Offset of the backlash compensation.
+    backlash_offset: BacklashOffset,
     psec: SetpointHistory,
     position: PositionState,
     /// Inputs to the inner loops in the present position cycle.
@@ -153,7 +162,10 @@ impl Axis {
         let angle = position / p.transmission_ratio;
         let plant = &p.loops.plant;
         let gravity = plant.gravity_torque(angle);
-        let wind_up = plant.transmission.wind_up_at_rest(gravity);
+        let (wind_up, contact) = match &p.event_driven {
+            Some(transmission) => transmission.at_rest(gravity),
+            None => (plant.transmission.wind_up_at_rest(gravity), ContactState::default()),
+        };
         let current = gravity / plant.torque_constant();
         // The drive assumes its own Kt.
         let torque = gravity * (p.torque_constant / plant.torque_constant());
@@ -161,6 +173,7 @@ impl Axis {
         let state = InnerLoopState {
             motor: MotorState { current, speed: 0.0, angle: angle + p.wind_up_feedback * wind_up },
             load: LoadState { wind_up, speed: 0.0 },
+            contact,
             velocity: PiState { integral: torque, excess: 0.0 },
             filters: p.loops.filters.at_rest(current),
             current: PiState { integral: voltage, excess: 0.0 },
@@ -172,6 +185,7 @@ impl Axis {
             load: 0.0,
             velocity_offset: 0.0,
             contour_offset: 0.0,
+            backlash_offset: BacklashOffset::default(),
             psec: SetpointHistory::new(position, p.ticks_per_position, p.setpoint_window()),
             position: PositionState::at_rest(angle),
             inputs: InnerLoopInputs::default(),
@@ -213,6 +227,7 @@ impl Axis {
     /// Writes or replaces the state.
     pub(super) fn code(&mut self, codec: &mut StateCodec<'_>) {
         codec.numbers([&mut self.load, &mut self.velocity_offset, &mut self.previous_load]);
+        self.backlash_offset.code(codec);
         self.psec.code(codec);
         self.position.code(codec);
         self.inputs = self.inputs.map(&mut |value| codec.number(*value));
@@ -246,7 +261,14 @@ impl Axis {
 
     /// Returns the position that the position controller reads, m or rad.
     pub(super) fn measured_position(&self, p: &AxisParameters, state: &InnerLoopState) -> f64 {
-        p.loops.plant.position(state.motor.angle - p.wind_up_feedback * state.load.wind_up)
+        p.loops.plant.position(self.measured_angle(p, state))
+    }
+
+    /// Returns the angle that the position controller reads, rad of the motor.
+    fn measured_angle(&self, p: &AxisParameters, state: &InnerLoopState) -> f64 {
+        // A scale at the load does not see the motion of the structure.
+        let wind_up = p.wind_up_feedback * (state.load.wind_up + state.contact.structure);
+        state.motor.angle - wind_up - self.backlash_offset.angle()
     }
 
     /// Sets the velocity that cross-coupled control adds in the present position cycle, m/s.
@@ -281,7 +303,8 @@ impl Axis {
         let torque = hold(p.torque_delay, &|k| p.feedforward.torque(history, k));
         let feedforward = velocity.at(0.0);
         let setpoint = |j| history.at(k + j) * p.inverse_ratio;
-        let angle = motor.angle - p.wind_up_feedback * state.load.wind_up;
+        self.backlash_offset.update(&p.backlash_compensation, setpoint(0) - setpoint(-1));
+        let angle = self.measured_angle(p, state);
         let mut unlimited = p.position.update(&mut self.position, setpoint, angle, feedforward);
         let offset = self.velocity_offset + std::mem::take(&mut self.contour_offset);
         // Adding 0 would change the sign of -0.

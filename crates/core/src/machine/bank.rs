@@ -1,5 +1,7 @@
 //! SIMD blocks that hold the inner loops of all axes of a machine; selection of block size and SIMD width.
 
+use std::sync::Arc;
+
 use pulp::{Arch, Scalar, Simd, WithSimd};
 
 use super::axis::DriveState;
@@ -7,7 +9,7 @@ use super::inner_loops::{
     Aligned, AxisBlock, CycleStatistics, CycleTicks, InnerLoopInputs, InnerLoopState, InnerLoops, TickRecord,
     TickSpan,
 };
-use crate::drive::LoadState;
+use crate::drive::{EventDrivenTransmission, LoadState};
 use crate::state_codec::StateCodec;
 
 /// Lanes of the small block, used for up to four axes if the widest vector of the processor has at most four lanes:
@@ -104,6 +106,13 @@ impl AxisBank {
     /// Sets the parameters of an axis.
     pub fn set_loops(&mut self, axis: usize, loops: &InnerLoops) {
         with_lane!(&mut self.blocks, axis, block_and_lane_mut, |block, lane| block.set_loops(lane, loops));
+    }
+
+    /// Sets the event-driven transmission of an axis.
+    pub fn set_event_driven(&mut self, axis: usize, transmission: Option<Arc<EventDrivenTransmission>>) {
+        with_lane!(&mut self.blocks, axis, block_and_lane_mut, |block, lane| {
+            block.set_event_driven(lane, transmission);
+        });
     }
 
     /// Returns the state of an axis.

@@ -5,11 +5,14 @@
 //! compiled once per SIMD width. Its documentation lists the equations.
 
 use std::hint::black_box;
+use std::sync::Arc;
 
 use pulp::Simd;
 
 use crate::control::{CurrentFilterState, CurrentFilters, Pi, PiState};
-use crate::drive::{FrictionExpansion, GravityExpansion, LoadState, MotorState, Plant};
+use crate::drive::{
+    ContactState, EventDrivenTransmission, FrictionExpansion, GravityExpansion, LoadState, MotorState, Plant,
+};
 use crate::simd::{SimdLoad, SimdReal, Unroll2, Vector, soa_struct};
 use crate::state_codec::StateCodec;
 
@@ -30,6 +33,7 @@ soa_struct! {
     pub(super) struct InnerLoopState {
         pub motor: MotorState<N>,
         pub load: LoadState<N>,
+        pub contact: ContactState<N>,
         /// Deflection of the bristles of friction, rad of the motor; 0 without presliding.
         pub deflection: N,
         pub velocity: PiState<N>,
@@ -127,6 +131,20 @@ soa_struct! {
     }
 }
 
+soa_struct! {
+    /// Step of the axes with an event-driven transmission: inputs and results.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    struct EventDrivenStep {
+        motor: MotorState<N>,
+        load: LoadState<N>,
+        contact: ContactState<N>,
+        speed_drop: N,
+        voltage: N,
+        /// Load minus gravity, N·m at the motor.
+        external: N,
+    }
+}
+
 /// Value aligned to a cache line of 64 bytes, the size of the largest SIMD vector.
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
@@ -194,6 +212,10 @@ pub(super) struct AxisBlock<const L: usize> {
     has_tilting_axis: bool,
     /// True if the transmission of any axis is elastic.
     has_elastic_axis: bool,
+    /// Transmissions of the axes with backlash, friction at the load or a structure.
+    event_driven: [Option<Arc<EventDrivenTransmission>>; L],
+    /// True if there is an event-driven transmission.
+    has_event_driven_axis: bool,
     /// True if the friction of any axis has presliding.
     has_presliding: bool,
     /// True if the friction law of any axis has a Stribeck or viscous term.
@@ -223,6 +245,8 @@ impl<const L: usize> AxisBlock<L> {
             span_state: Aligned(SpanState::default().fill()),
             has_tilting_axis: loops.plant.gravity.is_position_dependent(),
             has_elastic_axis: false,
+            event_driven: [const { None }; L],
+            has_event_driven_axis: false,
             has_presliding: false,
             has_stribeck_terms: false,
             has_filters: false,
@@ -298,6 +322,12 @@ impl<const L: usize> AxisBlock<L> {
         self.has_stribeck_terms = any(|loops| loops.plant.friction_speed_drop.has_stribeck_terms());
         let rows = if self.has_elastic_axis { self.motors.len() } else { 0 };
         self.loads.resize_with(rows, || Aligned(LoadState::default().fill()));
+    }
+
+    /// Sets the event-driven transmission of a lane, in place of that of its plant.
+    pub fn set_event_driven(&mut self, lane: usize, transmission: Option<Arc<EventDrivenTransmission>>) {
+        self.event_driven[lane] = transmission;
+        self.has_event_driven_axis = self.event_driven.iter().any(Option::is_some);
     }
 
     /// Returns true if an axis has a property that the paper's model leaves out.
@@ -460,7 +490,15 @@ impl<const L: usize> AxisBlock<L> {
                 speed_drop = if IS_EXTENDED {
                     let deflection = self.has_presliding.then_some(&mut state.deflection);
                     match self.has_elastic_axis {
-                        true => loops.plant.step_elastic(motor, load, deflection, torques),
+                        true => {
+                            let speed_drop = loops.plant.step_elastic(motor, load, deflection, torques);
+                            match self.has_event_driven_axis {
+                                true => {
+                                    self.step_event_driven(simd, index, tick, &mut state, torques, speed_drop)
+                                }
+                                false => speed_drop,
+                            }
+                        }
                         false => loops.plant.step_rigid(motor, deflection, torques),
                     }
                 } else {
@@ -493,6 +531,39 @@ impl<const L: usize> AxisBlock<L> {
             statistics.peak_speed = motor.speed.abs().max(statistics.peak_speed);
         }
         self.statistics.0.store(index, &statistics);
+    }
+}
+
+impl<const L: usize> AxisBlock<L> {
+    /// Replaces the step of the axes with an event-driven transmission in `state` and in the speed drops by friction; each is
+    /// stepped by itself.
+    #[inline(always)]
+    fn step_event_driven<S: Simd, N: SimdLoad<S>>(
+        &self,
+        simd: S,
+        index: usize,
+        tick: usize,
+        state: &mut InnerLoopState<N>,
+        [voltage, external, _]: [N; 3],
+        speed_drop: N,
+    ) -> N {
+        let InnerLoopState { motor, load, contact, .. } = *state;
+        let mut rows: Aligned<EventDrivenStep<[f64; L]>> = Aligned(EventDrivenStep::default().fill());
+        let vector = EventDrivenStep { motor, load, contact, speed_drop, voltage, external };
+        rows.0.store(index, &vector);
+        for lane in index * N::LANES..(index + 1) * N::LANES {
+            if let Some(transmission) = &self.event_driven[lane] {
+                let mut step = rows.0.lane(lane);
+                (step.motor, step.load) = (self.motors[tick].0.lane(lane), self.loads[tick].0.lane(lane));
+                let EventDrivenStep { motor, load, contact, voltage, external, .. } = &mut step;
+                let torque = transmission.step(motor, load, contact, *voltage, *external);
+                step.speed_drop = transmission.speed_drop_from_torque(torque);
+                rows.0.set_lane(lane, &step);
+            }
+        }
+        let step: EventDrivenStep<N> = rows.0.load(simd, index);
+        (state.motor, state.load, state.contact) = (step.motor, step.load, step.contact);
+        step.speed_drop
     }
 }
 

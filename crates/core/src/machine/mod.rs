@@ -139,7 +139,11 @@ impl MachineParameters {
 
     fn bank(&self) -> AxisBank {
         let loops: Vec<InnerLoops> = self.axes.iter().map(|axis| axis.loops).collect();
-        AxisBank::new(&loops, self.cycle_ticks())
+        let mut bank = AxisBank::new(&loops, self.cycle_ticks());
+        for (index, axis) in self.axes.iter().enumerate() {
+            bank.set_event_driven(index, axis.event_driven.clone());
+        }
+        bank
     }
 }
 
@@ -230,6 +234,7 @@ impl Machine {
             axis.update_parameters(old, p, &mut state);
             self.bank.set_state(index, &state);
             self.bank.set_loops(index, &p.loops);
+            self.bank.set_event_driven(index, p.event_driven.clone());
             if old.compensation.is_some() {
                 self.bank.set_compensation(index, |_| 0.0);
             }

@@ -1,6 +1,7 @@
 //! Tests of plant and inner loops: closed forms, C reference, friction, parameter ranges, SIMD bit-identity.
 
 mod analytic;
+mod backlash;
 mod current_filter;
 mod drives;
 mod friction;

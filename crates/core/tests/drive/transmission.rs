@@ -78,7 +78,12 @@ fn a_step_is_the_matrix_exponential() {
     let (mut worst, mut count) = (0.0_f64, 0);
     for row in golden("transmissions.csv") {
         let motor = motor_config(std::array::from_fn(|k| row[k]));
-        let elastic = TransmissionConfig { stiffness: row[6], damping: row[7], load_inertia: row[8] };
+        let elastic = TransmissionConfig {
+            stiffness: row[6],
+            damping: row[7],
+            load_inertia: row[8],
+            ..TransmissionConfig::default()
+        };
         let drive = Transmission::new(&motor, &elastic, row[5]).expect("can be discretized");
         for (column, found) in columns(&drive).into_iter().enumerate() {
             for (state, found) in found.into_iter().enumerate() {
@@ -113,7 +118,7 @@ fn resonance_and_antiresonance_are_those_of_two_masses() {
     let motor = motor_config([0.028, 1e-12, 0.0, 0.5, 8e-3]);
     let (tick, load) = (125e-6, 0.012);
     for stiffness in [20.0, 2000.0, 2e5] {
-        let elastic = TransmissionConfig { stiffness, damping: 0.0, load_inertia: load };
+        let elastic = TransmissionConfig { stiffness, load_inertia: load, ..TransmissionConfig::default() };
         let free = transition(&Transmission::new(&motor, &elastic, tick).expect("can be discretized"));
         let resonance = (stiffness / load + stiffness / (0.028 - load)).sqrt();
         let found = frequencies(&nalgebra::DMatrix::from_iterator(4, 4, free.iter().copied()), tick);

@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use virtual_axes_core::config::{
-    AxisConfig, AxisKind, DelaysConfig, DeviationConfig, FeedforwardConfig, FrictionConfig, GravityConfig,
-    LimitsConfig, MotorConfig, Periods, PiConfig, PositionControllerConfig, PositionFeedback,
-    PositionLoopConfig, StribeckConfig,
+    AxisConfig, AxisKind, BacklashCompensationConfig, DelaysConfig, DeviationConfig, FeedforwardConfig,
+    FrictionConfig, GravityConfig, LimitsConfig, MotorConfig, Periods, PiConfig, PositionControllerConfig,
+    PositionFeedback, PositionLoopConfig, StribeckConfig,
 };
 use virtual_axes_core::units::{
     METER_PER_MINUTE, MICROSECOND_NS, MILLIMETER, MILLISECOND_NS, Nanoseconds, POSITION_GAIN,
@@ -146,6 +146,7 @@ pub(super) fn draw_axis(
             feedback: PositionFeedback::Motor,
             gain: random.between(1.5, 3.5) * POSITION_GAIN,
             controller: PositionControllerConfig::Cascade,
+            backlash_compensation: BacklashCompensationConfig::default(),
             allow_unstable: false,
         },
         velocity_loop,

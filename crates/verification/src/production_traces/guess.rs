@@ -1,8 +1,9 @@
 //! Knowledge of a user about a hidden axis.
 
 use virtual_axes_core::config::{
-    AxisConfig, DelaysConfig, FeedforwardConfig, FrictionConfig, GravityConfig, MachineConfig, MotorConfig,
-    Periods, PiConfig, PositionControllerConfig, PositionFeedback, PositionLoopConfig,
+    AxisConfig, BacklashCompensationConfig, DelaysConfig, FeedforwardConfig, FrictionConfig, GravityConfig,
+    MachineConfig, MotorConfig, Periods, PiConfig, PositionControllerConfig, PositionFeedback,
+    PositionLoopConfig,
 };
 use virtual_axes_core::units::{MICROSECOND_NS, MILLISECOND_NS, Nanoseconds, POSITION_GAIN};
 
@@ -70,6 +71,7 @@ impl HiddenAxis {
                 feedback: PositionFeedback::Motor,
                 gain: if is_gain_known { hidden.position_loop.gain } else { DEFAULT_GAIN * POSITION_GAIN },
                 controller: PositionControllerConfig::Cascade,
+                backlash_compensation: BacklashCompensationConfig::default(),
                 allow_unstable: false,
             },
             velocity_loop: PiConfig { gain: VELOCITY_BANDWIDTH * inertia, integral_time: 4e-3 },
