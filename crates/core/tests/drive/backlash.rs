@@ -297,7 +297,7 @@ fn lost_motion_is_the_gap_and_the_twist_by_friction_at_the_load() {
 fn compensation_removes_the_gap_from_the_error_of_the_load() {
     let friction = ["x.friction.a=0.5", "x.friction.b=0", "x.friction.c=0", "x.friction.i0=0.5"];
     let base = [&BACKLASH_X[..], &friction].concat();
-    let config = machine(&base);
+    let config = machine(&[&ELASTIC_X[..], &base].concat());
     let axis = &config.axes()[X];
     let lost = 10e-6 + 2.0 * 0.5 * axis.motor.torque_constant / axis.transmission_ratio / 200e6;
     let error = |changes: &[&str]| {

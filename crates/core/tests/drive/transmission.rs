@@ -262,14 +262,23 @@ proptest! {
         mass in -6.0..6.0_f64,
         gain in -2.0..1.0_f64,
         feedback in prop::bool::ANY,
+        backlash in prop_oneof![Just(0.0), 0.0..1e4_f64],
+        load_friction in prop_oneof![Just(0.0), 0.0..1.0_f64],
+        structure in prop::option::of((-3.0..9.0_f64, -1.0..4.0_f64)),
     ) {
-        let changes = [
+        let mut changes = vec![
+            format!("x.transmission.backlash_um={backlash}"),
+            format!("x.transmission.load_friction={load_friction}"),
             format!("x.transmission.stiffness_n_um={}", 10_f64.powf(stiffness)),
             format!("x.transmission.damping_n_s_m={}", 10_f64.powf(damping)),
             format!("x.transmission.load_mass_kg={}", 10_f64.powf(mass)),
             format!("x.position_loop.gain={}", 10_f64.powf(gain)),
             format!("x.position_loop.feedback={}", if feedback { "load" } else { "motor" }),
         ];
+        if let Some((mass, frequency)) = structure {
+            changes.push(format!("x.structure.mass_kg={}", 10_f64.powf(mass)));
+            changes.push(format!("x.structure.frequency_hz={}", 10_f64.powf(frequency)));
+        }
         let mut parameters = Parameters::embedded_default().expect("shipped");
         let source = ValueSource::named("test");
         let assignments = changes
