@@ -166,7 +166,7 @@ fn axes(config: &MachineConfig) {
     table("axes: one machine, figures of the axes", "axes", [1, 2, 4, 5, 8, 16, 32].map(row).into());
 }
 
-/// Measures the default machine with rigid and with elastic transmissions on all axes, and with presliding.
+/// Measures the default machine with rigid and with elastic transmissions on all axes, with presliding, and with backlash.
 fn transmissions(rigid: &MachineConfig) {
     let linear = ["x", "y", "z"].into_iter().flat_map(|axis| {
         [("stiffness_n_um", 200.0), ("damping_n_s_m", 15_000.0), ("load_mass_kg", 300.0)]
@@ -182,12 +182,18 @@ fn transmissions(rigid: &MachineConfig) {
     let rotary = ["a", "c"].map(|axis| (format!("{axis}.friction.presliding_stiffness_nm_rad"), 3e6));
     let bristles: Vec<(String, f64)> = linear.into_iter().chain(rotary).collect();
     let presliding = parameters(&bristles).machine_config().expect("a machine");
+    let linear = ["x", "y", "z"].map(|axis| (format!("{axis}.transmission.backlash_um"), 10.0));
+    let rotary = ["a", "c"].map(|axis| (format!("{axis}.transmission.backlash_deg"), 0.005));
+    let shares = ["x", "y", "z", "a", "c"].map(|axis| (format!("{axis}.transmission.load_friction"), 0.7));
+    let gaps = [changes.clone(), linear.into(), rotary.into(), shares.into()].concat();
+    let backlash = parameters(&gaps).machine_config().expect("a machine");
     let both = parameters(&[changes, bristles].concat()).machine_config().expect("a machine");
     let rows = vec![
         axes_row("rigid", rigid, AXES),
         axes_row("elastic", &elastic, AXES),
         axes_row("presliding", &presliding, AXES),
         axes_row("elastic, presliding", &both, AXES),
+        axes_row("elastic, backlash", &backlash, AXES),
     ];
     table("transmissions: one machine of five axes, figures of the axes", "axes", rows);
 }

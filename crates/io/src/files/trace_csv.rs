@@ -10,7 +10,7 @@ use virtual_axes_core::units::{Nanoseconds, seconds};
 type Signal = (&'static str, fn(&AxisSample) -> f64);
 
 /// Signals of an axis in a trace, in column order.
-const SIGNALS: [Signal; 7] = [
+const SIGNALS: [Signal; 8] = [
     ("psec", |s| s.psec),
     ("position", |s| s.position),
     ("velocity", |s| s.velocity),
@@ -18,6 +18,7 @@ const SIGNALS: [Signal; 7] = [
     ("current_setpoint", |s| s.current_setpoint),
     ("voltage", |s| s.voltage),
     ("friction_current", |s| s.friction_current),
+    ("wind_up", |s| s.wind_up),
 ];
 
 /// Writer of a trace as CSV; numbers are the shortest decimals that parse to the same value.

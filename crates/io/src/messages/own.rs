@@ -37,6 +37,7 @@ pub struct DriveStates {
     pub torque_feedforward: Vec<f64>,
     pub voltage: Vec<f64>,
     pub controller: Vec<String>,
+    pub wind_up: Vec<f64>,
 }
 
 /// Message `TrajectoryResult`; units in `msg/TrajectoryResult.msg`. `tracking_error` is the following error.

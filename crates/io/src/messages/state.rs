@@ -76,6 +76,7 @@ impl Sampled for DriveStates {
         put(&mut self.velocity_feedforward, samples, |s| s.velocity_feedforward);
         put(&mut self.torque_feedforward, samples, |s| s.torque_feedforward);
         put(&mut self.voltage, samples, |s| s.voltage);
+        put(&mut self.wind_up, samples, |s| s.wind_up);
         self.controller.resize_with(samples.len(), String::new);
         for (name, sample) in self.controller.iter_mut().zip(samples) {
             name.clear();
@@ -95,6 +96,7 @@ mod tests {
             position: v,
             effort: 2.0 * v,
             load_current: 3.0 * v,
+            wind_up: 4.0 * v,
             controller: if v > 0.0 { "cascade" } else { "none" },
             ..AxisSample::default()
         };
@@ -107,6 +109,7 @@ mod tests {
         assert_eq!(state, JointState::of(7, &samples, &joints));
         assert_eq!((drives.tracking_error[1], drives.controller[1].as_str()), (-2.0, "cascade"));
         assert_eq!((state.effort[1], state.header.stamp.nanosec), (4.0, 7));
+        assert_eq!(drives.wind_up, [4.0, 8.0]);
         assert_eq!(MotorCurrents::of(7, &samples, &joints).load, [3.0, 6.0]);
     }
 }

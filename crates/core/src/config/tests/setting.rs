@@ -70,7 +70,7 @@ fn every_live_key_accepts_both_ends_of_its_range() {
         }
     }
     // 38 on each of five axes, one of the machine, and four of the node.
-    assert_eq!(live, 2 * (5 * 38 + 1 + 4));
+    assert_eq!(live, 2 * (5 * 40 + 1 + 4));
 }
 
 #[test]

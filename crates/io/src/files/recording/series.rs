@@ -3,12 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use mcap::Message;
+use serde::Deserialize;
 
 use super::error::AxisRecordingError;
 use crate::files::mcap_reader::decode;
+use crate::messages::MotorCurrents;
 use crate::messages::builtin_interfaces::msg::Time;
 use crate::messages::sensor_msgs::msg::JointState;
-use crate::messages::{DriveStates, MotorCurrents};
+use crate::messages::std_msgs::msg::Header;
 use virtual_axes_core::text::{nearest_name, shortened};
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS, seconds};
 
@@ -70,7 +72,7 @@ impl MessageKind {
                 Decoded { stamp: m.header.stamp, names: m.name, fields: vec![("current", m.current)] }
             }
             MessageKind::DriveStates => {
-                let m: DriveStates = decode(message)?;
+                let m: RecordedDriveStates = decode(message)?;
                 let fields = vec![
                     ("position", m.position),
                     ("velocity", m.velocity),
@@ -82,6 +84,22 @@ impl MessageKind {
             }
         })
     }
+}
+
+/// Fields of `virtual_axes/msg/DriveStates` up to the last one that is read; later fields depend on the version.
+#[allow(dead_code, reason = "the fields in between take their place in a message")]
+#[derive(Deserialize)]
+struct RecordedDriveStates {
+    header: Header,
+    name: Vec<String>,
+    psec: Vec<f64>,
+    position: Vec<f64>,
+    tracking_error: Vec<f64>,
+    synchronized_tracking_error: Vec<f64>,
+    velocity: Vec<f64>,
+    velocity_setpoint: Vec<f64>,
+    velocity_feedforward: Vec<f64>,
+    torque_feedforward: Vec<f64>,
 }
 
 /// Decoded message of any kind.
