@@ -8,8 +8,9 @@ use virtual_axes_core::drive::{ContactState, EventDrivenTransmission, LoadState,
 use virtual_axes_core::machine::{Machine, MachineParameters, SimdWidth};
 use virtual_axes_verification::fixtures::machines::AXES;
 
+use crate::bits::{assert_bits_of_every_width_and_part, bits, psec};
 use crate::parameter_ranges::golden;
-use crate::transmission::{ELASTIC_X, FRICTIONLESS, X, bits, machine, psec};
+use crate::transmission::{ELASTIC_X, FRICTIONLESS, X, machine};
 
 const TICK: f64 = 125e-6;
 /// Gap of 10 µm on X, with all friction at the table.
@@ -226,14 +227,7 @@ fn bits_are_those_of_every_width_and_of_every_part_of_a_cycle() {
     let structure = ["a.structure.frequency_hz=40", "a.structure.inertia_kg_m2=500"];
     let elastic_a = ["a.transmission.stiffness_nm_rad=2e6", "a.transmission.load_inertia_kg_m2=12"];
     let config = machine(&[&ELASTIC_X[..], &BACKLASH_X, &elastic_a, &structure].concat());
-    for axis in 0..AXES {
-        let wanted = bits(&config, axis, SimdWidth::Widest, &[48]);
-        for width in [SimdWidth::Widest, SimdWidth::Four, SimdWidth::Baseline] {
-            for parts in [&[48][..], &[1, 20, 27], &[47, 1]] {
-                assert!(bits(&config, axis, width, parts) == wanted, "axis {axis}, {width:?}, {parts:?}");
-            }
-        }
-    }
+    assert_bits_of_every_width_and_part(&config);
     // Axes without any of it keep their bits.
     let rigid = machine(&[]);
     for axis in [1, 2, 4] {

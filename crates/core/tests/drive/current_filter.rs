@@ -10,7 +10,8 @@ use virtual_axes_core::control::{BiquadFilter, BiquadState};
 use virtual_axes_core::machine::{Machine, MachineParameters, SimdWidth, prediction_model};
 use virtual_axes_verification::fixtures::machines::AXES;
 
-use crate::transmission::{ELASTIC_X, FRICTIONLESS, X, bits, machine, psec};
+use crate::bits::{assert_bits_of_every_width_and_part, bits, psec};
+use crate::transmission::{ELASTIC_X, FRICTIONLESS, X, machine};
 
 const PERIOD: f64 = 500e-6;
 const FILTERED_X: [&str; 7] = [
@@ -100,14 +101,7 @@ fn step_response_is_the_sum_of_the_modes() {
 #[test]
 fn bits_are_those_of_every_width_and_of_every_part_of_a_cycle() {
     let config = machine(&[&ELASTIC_X[..], &FILTERED_X, &LOW_PASS_Z].concat());
-    for axis in 0..AXES {
-        let wanted = bits(&config, axis, SimdWidth::Widest, &[48]);
-        for width in [SimdWidth::Widest, SimdWidth::Four, SimdWidth::Baseline] {
-            for parts in [&[48][..], &[1, 20, 27], &[47, 1]] {
-                assert!(bits(&config, axis, width, parts) == wanted, "axis {axis}, {width:?}, {parts:?}");
-            }
-        }
-    }
+    assert_bits_of_every_width_and_part(&config);
 }
 
 #[test]

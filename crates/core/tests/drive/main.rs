@@ -2,6 +2,7 @@
 
 mod analytic;
 mod backlash;
+mod bits;
 mod current_filter;
 mod drives;
 mod friction;

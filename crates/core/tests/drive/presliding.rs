@@ -11,8 +11,9 @@ use virtual_axes_core::drive::{Friction, LoadState, MotorState, Plant, Preslidin
 use virtual_axes_core::machine::{Machine, MachineParameters, SimdWidth};
 use virtual_axes_verification::fixtures::machines::{AXES, configured_with};
 
+use crate::bits::{assert_bits_of_every_width_and_part, bits};
 use crate::parameter_ranges::golden;
-use crate::transmission::{ELASTIC_X, bits};
+use crate::transmission::ELASTIC_X;
 
 const X: usize = 0;
 /// Bristles of 50 N/µm on X: at most 17 µm before it slides.
@@ -268,14 +269,7 @@ proptest! {
 #[test]
 fn bits_are_those_of_every_width_and_of_every_part_of_a_cycle() {
     let config = machine(&[&PRESLIDING_X[..], &PRESLIDING_A, &STRIBECK_Y, &ELASTIC_X].concat());
-    for axis in 0..AXES {
-        let wanted = bits(&config, axis, SimdWidth::Widest, &[48]);
-        for width in [SimdWidth::Widest, SimdWidth::Four, SimdWidth::Baseline] {
-            for parts in [&[48][..], &[1, 20, 27], &[47, 1]] {
-                assert!(bits(&config, axis, width, parts) == wanted, "axis {axis}, {width:?}, {parts:?}");
-            }
-        }
-    }
+    assert_bits_of_every_width_and_part(&config);
 }
 
 #[test]

@@ -7,7 +7,12 @@ use virtual_axes_core::machine::{Machine, MachineParameters, StateError};
 use virtual_axes_verification::fixtures::machines::{AXES, TSP, configured_with};
 
 fn parameters(changes: &[&str]) -> Arc<MachineParameters> {
-    let config = configured_with("mikron_ucp710", changes, &[]);
+    parameters_with(changes, &[])
+}
+
+/// Returns the parameters with changes of every axis, and changes of the machine.
+fn parameters_with(of_axes: &[&str], of_machine: &[&str]) -> Arc<MachineParameters> {
+    let config = configured_with("mikron_ucp710", of_axes, of_machine);
     Arc::new(MachineParameters::new(&config).expect("can be discretized"))
 }
 
@@ -44,6 +49,18 @@ const VARIANTS: [&[&str]; 4] = [
     &["feedforward.velocity=0.5", "delays.alpha_ms=20"],
 ];
 
+/// X with everything that the state of an axis can contain.
+const EXTENDED_X: [&str; 8] = [
+    "x.transmission.stiffness_n_um=200",
+    "x.transmission.load_mass_kg=1200",
+    "x.transmission.backlash_um=10",
+    "x.transmission.load_friction=0.6",
+    "x.structure.frequency_hz=40",
+    "x.structure.mass_kg=5000",
+    "x.backlash_compensation.width_um=8",
+    "x.current_filter_1.type=low_pass",
+];
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
@@ -52,8 +69,9 @@ proptest! {
         before in prop::collection::vec(1_usize..200, 0..40),
         after in prop::collection::vec(1_usize..200, 20),
     ) {
-        for changes in VARIANTS {
-            let parameters = parameters(changes);
+        let extended = (&[][..], &EXTENDED_X[..]);
+        for changes in VARIANTS.into_iter().map(|of_axes| (of_axes, &[][..])).chain([extended]) {
+            let parameters = parameters_with(changes.0, changes.1);
             let mut machine = Machine::new(parameters.clone());
             for &ticks in &before {
                 bits_of_ticks(&mut machine, ticks);

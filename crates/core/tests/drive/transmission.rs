@@ -10,8 +10,9 @@ use virtual_axes_core::config::{
 };
 use virtual_axes_core::drive::{LoadState, Motor, MotorState, Plant, Transmission};
 use virtual_axes_core::machine::{Machine, MachineParameters, SimdWidth, prediction_model};
-use virtual_axes_verification::fixtures::machines::{AXES, TSP, configured_with};
+use virtual_axes_verification::fixtures::machines::{AXES, configured_with};
 
+use crate::bits::{assert_bits_of_every_width_and_part, bits, psec};
 use crate::parameter_ranges::{golden, run_demanding_setpoints};
 
 pub const X: usize = 0;
@@ -305,40 +306,10 @@ proptest! {
     }
 }
 
-/// Setpoints of all axes in a position cycle.
-pub fn psec(k: usize) -> [f64; AXES] {
-    std::array::from_fn(|axis| 0.02 * (1.0 - (9.0 * TSP * k as f64 + axis as f64).cos()))
-}
-
-/// Returns the bits of position, velocity, current and wind-up of an axis over all ticks of a motion.
-pub fn bits(config: &MachineConfig, axis: usize, width: SimdWidth, parts: &[usize]) -> Vec<u64> {
-    let mut machine = Machine::new(Arc::new(MachineParameters::new(config).expect("can be discretized")));
-    machine.set_simd_width(width);
-    let mut bits = Vec::new();
-    for k in 0..120 {
-        machine.set_load(axis, if k % 9 < 3 { 2000.0 } else { 0.0 });
-        for &part in parts {
-            machine.advance_ticks(part, &psec(k), &[]);
-        }
-        for tick in 0..machine.ticks_per_period() {
-            bits.extend(machine.motion_at(axis, tick).map(f64::to_bits));
-        }
-        bits.push(machine.sample_at_end(axis).wind_up.to_bits());
-    }
-    bits
-}
-
 #[test]
 fn bits_are_those_of_every_width_and_of_every_part_of_a_cycle() {
     let config = machine(&[&ELASTIC_X[..], &ELASTIC_A].concat());
-    for axis in 0..AXES {
-        let wanted = bits(&config, axis, SimdWidth::Widest, &[48]);
-        for width in [SimdWidth::Widest, SimdWidth::Four, SimdWidth::Baseline] {
-            for parts in [&[48][..], &[1, 20, 27], &[47, 1]] {
-                assert!(bits(&config, axis, width, parts) == wanted, "axis {axis}, {width:?}, {parts:?}");
-            }
-        }
-    }
+    assert_bits_of_every_width_and_part(&config);
 }
 
 #[test]
