@@ -94,6 +94,7 @@ impl Friction {
     }
 
     /// Returns the largest friction torque at motor speed ω (rad/s), N·m; it is not negative.
+    #[inline(always)]
     pub fn bound(&self, speed: f64) -> f64 {
         let moving = self.moving.at(speed.abs().min(self.constant_from_speed));
         self.limit_to_resisting(speed, moving + self.stribeck_terms(speed))

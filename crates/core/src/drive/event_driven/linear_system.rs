@@ -51,10 +51,10 @@ pub(super) const SPEED_AT: [usize; PLACES] = [SPEED, LOAD_SPEED];
 /// Linear system of an axis in one of its modes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LinearSystem {
-    /// Derivatives of the states by states and inputs.
-    derivative: SMatrix<f64, STATES, ORDER>,
-    /// Weights of states and inputs after a whole substep.
-    substep: SMatrix<f64, STATES, ORDER>,
+    /// Derivatives of the states by each state and input.
+    derivative: [[f64; STATES]; ORDER],
+    /// States after a whole substep by each state and input.
+    substep: [[f64; STATES]; ORDER],
     /// Changes of the speeds of motor, load and structure by an impulse at each of them, (rad/s)/(N·m·s).
     mobility: Matrix3<f64>,
 }
@@ -196,49 +196,60 @@ impl Equations<'_> {
             // The twist of a spring without load is not linear in these states.
             derivative.row_mut(TWIST).fill(0.0);
         }
-        let mut system = LinearSystem { derivative, substep: SMatrix::zeros(), mobility };
-        for column in 0..ORDER {
-            let mut unit = StatesAndInputs::zeros();
-            unit[column] = 1.0;
-            system.substep.set_column(column, &system.after(&unit, period));
-        }
+        let derivative = std::array::from_fn(|column| derivative.column(column).into_owned().into());
+        let mut system = LinearSystem { derivative, substep: [[0.0; STATES]; ORDER], mobility };
+        system.substep = std::array::from_fn(|column| system.after_unit(column, period).into());
         system
     }
+}
+
+/// Returns the sum of the columns with the weights `values`, one for each of the first columns.
+#[inline(always)]
+fn weighted<'a>(columns: &[[f64; STATES]; ORDER], values: impl Iterator<Item = &'a f64>) -> States {
+    let mut sum = [0.0; STATES];
+    for (column, value) in columns.iter().zip(values) {
+        for (sum, entry) in sum.iter_mut().zip(column) {
+            *sum += entry * value;
+        }
+    }
+    sum.into()
 }
 
 impl LinearSystem {
     /// Returns the states `time` seconds after `start`, by the power series of the exponential.
     fn after(&self, start: &StatesAndInputs, time: f64) -> States {
-        let states = self.derivative.fixed_view::<STATES, STATES>(0, 0).into_owned();
-        let mut term: States = self.derivative * start * time;
+        let mut term = weighted(&self.derivative, start.iter()) * time;
         let mut sum: States = start.fixed_rows::<STATES>(0) + term;
         for order in 2..=TERMS {
-            term = states * term * (time / order as f64);
+            term = weighted(&self.derivative, term.iter()) * (time / order as f64);
             sum += term;
         }
         sum
     }
 
+    /// Returns the states `time` seconds after a start at 0 with 1 for one state or input.
+    fn after_unit(&self, index: usize, time: f64) -> States {
+        let mut unit = StatesAndInputs::zeros();
+        unit[index] = 1.0;
+        self.after(&unit, time)
+    }
+
     /// Returns the response after a whole substep.
+    #[inline(always)]
     pub fn whole(&self, start: &StatesAndInputs) -> Response {
-        let by = |input: usize| self.substep.column(input).into_owned();
         Response {
-            free: self.substep * start,
-            by_torque: [by(MOTOR_TORQUE), by(LOAD_TORQUE)],
+            free: weighted(&self.substep, start.iter()),
+            by_torque: [self.substep[MOTOR_TORQUE].into(), self.substep[LOAD_TORQUE].into()],
             mobility: self.mobility,
         }
     }
 
     /// Returns the response after `time` seconds, a part of a substep.
+    #[inline(never)]
     pub fn part(&self, start: &StatesAndInputs, time: f64) -> Response {
-        let by = |input: usize| {
-            let mut unit = StatesAndInputs::zeros();
-            unit[input] = 1.0;
-            self.after(&unit, time)
-        };
         Response {
             free: self.after(start, time),
-            by_torque: [by(MOTOR_TORQUE), by(LOAD_TORQUE)],
+            by_torque: [MOTOR_TORQUE, LOAD_TORQUE].map(|input| self.after_unit(input, time)),
             mobility: self.mobility,
         }
     }
@@ -247,19 +258,21 @@ impl LinearSystem {
     pub fn is_valid(&self, mode: Mode) -> bool {
         let accelerates = |place: usize| {
             let input = [MOTOR_TORQUE, LOAD_TORQUE][place];
-            mode.is_held[place] || self.substep[(SPEED_AT[place], input)] > 0.0
+            mode.is_held[place] || self.substep[input][SPEED_AT[place]] > 0.0
         };
-        self.substep.iter().all(|weight| weight.is_finite()) && (0..PLACES).all(accelerates)
+        self.substep.as_flattened().iter().all(|weight| weight.is_finite()) && (0..PLACES).all(accelerates)
     }
 }
 
 impl Response {
     /// Returns the displacement at each place of friction in `states`, rad.
+    #[inline(always)]
     fn displacements(states: &States) -> [f64; PLACES] {
         [states[ANGLE], states[ANGLE] - states[WIND_UP]]
     }
 
     /// Returns the friction torques, N·m, that bring motor and load to rest, limited to `bounds`.
+    #[inline(always)]
     pub fn stopping_torques(&self, bounds: [f64; PLACES]) -> [f64; PLACES] {
         let mut torques = [0.0; PLACES];
         // Each torque has little effect on the other speed within a tick.
@@ -277,6 +290,7 @@ impl Response {
     }
 
     /// Returns the torque that changes the speed at a place by −`speed`, N·m, limited to `bound`.
+    #[inline(always)]
     fn torque_for(&self, place: usize, speed: f64, bound: f64) -> f64 {
         clamp_abs(speed / self.by_torque[place][SPEED_AT[place]], bound)
     }
@@ -286,6 +300,7 @@ impl Response {
     ///
     /// Friction never supplies energy: where a constant torque would act along the displacement, it acts as an impulse at
     /// the end.
+    #[inline(always)]
     pub fn with_friction(
         &self,
         mut torques: [f64; PLACES],

@@ -154,6 +154,7 @@ impl EventDrivenTransmission {
     ///
     /// `external` is load minus gravity, N·m at the motor. Wind-up and speed of `load` are those against the environment,
     /// with the motion of the structure.
+    #[inline(always)]
     pub fn step(
         &self,
         motor: &mut MotorState,
@@ -203,6 +204,7 @@ impl EventDrivenTransmission {
     }
 
     /// Steps by one substep, from event to event; returns the impulse of all friction, N·m·s.
+    #[inline(always)]
     fn substep(&self, state: &mut State, [voltage, external]: [f64; 2], bounds: [f64; PLACES]) -> f64 {
         let (mut left, mut impulse) = (self.period, 0.0);
         let mut events = if self.backlash > 0.0 { 0 } else { MAX_EVENTS };
@@ -263,6 +265,7 @@ impl EventDrivenTransmission {
 
     /// Returns a function of the states `time` seconds after `state` that is positive beyond the next event: the torque that
     /// pulls at a contact, N·m, or the travel beyond the gap, rad.
+    #[inline(always)]
     fn crossing(&self, state: &State, next: &States, time: f64) -> f64 {
         let wind_up = state.wind_up + next[WIND_UP];
         if state.side == 0.0 {
@@ -277,6 +280,7 @@ impl EventDrivenTransmission {
 }
 
 impl Span<'_> {
+    #[inline(always)]
     fn response(&self, mode: Mode, time: f64) -> Response {
         let system = &self.transmission.systems[mode.index()];
         match time == self.transmission.period {
@@ -289,6 +293,7 @@ impl Span<'_> {
     ///
     /// Friction is the torque that brings a place to rest, limited to its bound. What is at rest at the start and would be
     /// at the end is held in between.
+    #[inline(always)]
     fn end(&self, time: f64) -> (States, [f64; PLACES]) {
         let free = Mode { is_in_contact: self.is_in_contact, is_held: [false; PLACES] };
         let response = self.response(free, time);
@@ -309,6 +314,7 @@ impl Span<'_> {
 
 /// Returns an instant up to `end` at which `crossing` has become positive, by the Illinois method with bisection.
 /// `crossing` is positive at `end`.
+#[inline(never)]
 fn event_instant(end: f64, crossing: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, end);
     let (mut below, mut above) = (crossing(0.0).min(0.0), crossing(end));
