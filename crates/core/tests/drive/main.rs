@@ -11,3 +11,4 @@ mod scalar_c;
 mod simd;
 mod stored_states;
 mod transmission;
+mod two_masses;
