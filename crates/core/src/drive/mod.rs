@@ -17,6 +17,7 @@ mod plant;
 mod presliding;
 mod response;
 mod transmission;
+mod workpiece_dynamics;
 
 pub use friction::Friction;
 pub(crate) use friction_expansion::FrictionExpansion;
@@ -26,6 +27,7 @@ pub use motor::{Motor, MotorState};
 pub use plant::{Plant, Torques};
 pub use presliding::Presliding;
 pub use transmission::{LoadState, Transmission};
+pub use workpiece_dynamics::{STANDARD_GRAVITY, WorkpieceDynamics};
 
 use crate::units::Rounded;
 

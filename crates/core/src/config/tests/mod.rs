@@ -1,5 +1,6 @@
 //! Tests of the configuration: rejected files and values, accepted values, built-in machines.
 
+mod couplings;
 mod machines;
 mod rejected_files;
 mod rejected_values;
