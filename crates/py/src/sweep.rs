@@ -47,18 +47,22 @@ impl Sweep<'_> {
     }
 
     /// Returns the axes that differ in a batch that can run as lanes beside each other; `None` if a variant differs in
-    /// more than axes, or in delays.
+    /// more than axes, or in delays, or if axes depend on each other.
     fn own_axes(&self, batch: &[MachineConfig]) -> Option<Vec<usize>> {
         let base = &self.base.config;
-        let is_alike = batch.iter().all(|variant| {
-            let pairs = variant.axes().iter().zip(base.axes());
-            variant.axes().len() == base.axes().len()
-                && variant.periods() == base.periods()
-                && variant.kinematics() == base.kinematics()
-                && pairs
-                    .into_iter()
-                    .all(|(axis, base)| axis.delays == base.delays && axis.limits == base.limits)
-        });
+        let has_independent_axes =
+            |machine: &MachineConfig| machine.contour_gain() == 0.0 && !machine.has_coupled_axes();
+        let is_alike = has_independent_axes(base)
+            && batch.iter().all(|variant| {
+                let pairs = variant.axes().iter().zip(base.axes());
+                variant.axes().len() == base.axes().len()
+                    && has_independent_axes(variant)
+                    && variant.periods() == base.periods()
+                    && variant.kinematics() == base.kinematics()
+                    && pairs
+                        .into_iter()
+                        .all(|(axis, base)| axis.delays == base.delays && axis.limits == base.limits)
+            });
         let differs =
             |index: &usize| batch.iter().any(|variant| variant.axes()[*index] != base.axes()[*index]);
         is_alike.then(|| (0..base.axes().len()).filter(differs).collect())

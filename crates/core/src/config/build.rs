@@ -3,6 +3,10 @@
 use std::f64::consts::TAU;
 
 use super::check::to_ns;
+use super::coupling::{GantryConfig, WorkpieceConfig};
+use super::coupling_check::{
+    CENTER_OF_MASS, GANTRY_AXES, GANTRY_DAMPING, GANTRY_STIFFNESS, MOMENTS, WORKPIECE_MASS,
+};
 use super::definition::MotorKind;
 use super::error::{ConfigError, ValueSource};
 use super::layout::JointVariant;
@@ -45,7 +49,35 @@ impl Parameters {
                 .map(|joint| AxisParameters { set: self, joint }.config())
                 .collect::<Result<_, _>>()?,
             contour_gain: self.number("contour_control.gain")? * POSITION_GAIN,
+            workpiece: self.workpiece_config()?,
+            gantry: self.gantry_config()?,
         })
+    }
+
+    /// Returns the workpiece on the tables; `None` without a mass.
+    fn workpiece_config(&self) -> Result<Option<WorkpieceConfig>, ConfigError> {
+        let mass = self.number(WORKPIECE_MASS)?;
+        let numbers = |keys: [&str; 3], unit: f64| -> Result<[f64; 3], ConfigError> {
+            let [x, y, z] = keys.map(|key| self.number(key));
+            Ok([x? * unit, y? * unit, z? * unit])
+        };
+        let (center_of_mass, moments) = (numbers(CENTER_OF_MASS, MILLIMETER)?, numbers(MOMENTS, 1.0)?);
+        Ok((mass > 0.0).then_some(WorkpieceConfig { mass, center_of_mass, moments }))
+    }
+
+    /// Returns the gantry; `None` without its axes.
+    fn gantry_config(&self) -> Result<Option<GantryConfig>, ConfigError> {
+        let Some(Value::TextList(names)) = self.get(GANTRY_AXES) else { return Ok(None) };
+        let index = |name: &String| self.layout().joints.iter().position(|joint| joint.name == *name);
+        let indices: Vec<usize> = names.iter().filter_map(index).collect();
+        let Ok(axes) = <[usize; 2]>::try_from(indices) else {
+            return Err(self.missing(GANTRY_AXES, "two linear joints"));
+        };
+        Ok(Some(GantryConfig {
+            axes,
+            stiffness: self.number(GANTRY_STIFFNESS)? * NEWTON_PER_MICROMETER,
+            damping: self.number(GANTRY_DAMPING)?,
+        }))
     }
 
     fn kinematics_config(&self) -> Result<KinematicsConfig, ConfigError> {

@@ -54,6 +54,8 @@ pub(super) fn check(
     set.check_periods()?;
     set.check_publish_rate()?;
     set.check_clock()?;
+    set.check_workpiece(origin)?;
+    set.check_gantry(origin)?;
     for joint in &layout.joints {
         set.check_transmission(joint, origin)?;
         set.check_elasticity(joint, origin)?;
@@ -163,7 +165,7 @@ pub(super) fn joint_names(entries: &Entries) -> Result<Vec<String>, ConfigError>
 pub(super) struct CrossChecks<'a> {
     pub(super) entries: &'a Entries,
     changed: &'a [String],
-    layout: &'a ParameterLayout,
+    pub(super) layout: &'a ParameterLayout,
 }
 
 impl CrossChecks<'_> {

@@ -3,6 +3,7 @@
 //! [`Parameters::machine_config`](super::Parameters::machine_config) returns it, after the parameters were checked against
 //! the schema.
 
+use super::coupling::{GantryConfig, WorkpieceConfig};
 use super::plant::{
     FrictionConfig, GravityConfig, MotorConfig, PreslidingConfig, StribeckConfig, TransmissionConfig,
 };
@@ -20,6 +21,10 @@ pub struct MachineConfig {
     pub(crate) axes: Vec<AxisConfig>,
     /// Gain of cross-coupled control, 1/s; 0 without it.
     pub(crate) contour_gain: f64,
+    /// Workpiece that couples A and C; `None` without one.
+    pub(crate) workpiece: Option<WorkpieceConfig>,
+    /// Beam that couples two linear axes; `None` without one.
+    pub(crate) gantry: Option<GantryConfig>,
 }
 
 /// Sampling periods of the three loops, each an integer multiple of the next (Prévost Appendix 2).
@@ -287,12 +292,29 @@ impl MachineConfig {
             kinematics: KinematicsConfig::default(),
             axes: vec![axis],
             contour_gain: 0.0,
+            workpiece: None,
+            gantry: None,
         }
     }
 
     /// Returns the gain of cross-coupled control, 1/s; 0 without it.
     pub fn contour_gain(&self) -> f64 {
         self.contour_gain
+    }
+
+    /// Returns the workpiece that couples the tables of A and C; `None` without one.
+    pub fn workpiece(&self) -> Option<&WorkpieceConfig> {
+        self.workpiece.as_ref()
+    }
+
+    /// Returns the beam that couples the two linear axes of a gantry; `None` without one.
+    pub fn gantry(&self) -> Option<&GantryConfig> {
+        self.gantry.as_ref()
+    }
+
+    /// Returns true if axes are coupled mechanically, by a workpiece or the beam of a gantry.
+    pub fn has_coupled_axes(&self) -> bool {
+        self.workpiece.is_some() || self.gantry.is_some()
     }
 
     /// Returns the machine without velocity and travel limits of trajectories, for setpoints that may exceed them.

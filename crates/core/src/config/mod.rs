@@ -15,6 +15,8 @@
 mod aliases;
 mod build;
 mod check;
+mod coupling;
+mod coupling_check;
 mod definition;
 mod error;
 mod layout;
@@ -36,6 +38,7 @@ mod yaml_tree;
 mod tests;
 
 pub use aliases::ParameterAlias;
+pub use coupling::{GantryConfig, WorkpieceConfig};
 pub use definition::{DefaultValue, MotorKind, ParameterDefinition, ParameterKind, Presence, Scope};
 pub use error::{ConfigError, ValueSource};
 pub use machine::*;

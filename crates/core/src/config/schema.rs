@@ -18,6 +18,10 @@ const PERIOD_US: (f64, f64) = (1.0, 50e3);
 const MAX_DELAY_MS: f64 = 100.0;
 /// Maximum distance in a machine, mm; the largest gantries have some tens of meters.
 const MAX_DISTANCE_MM: f64 = 1e5;
+/// Maximum mass of a workpiece, kg, and moment of inertia, kg·m².
+const MAX_MASS_KG: f64 = 1e6;
+/// Maximum stiffness of a gantry, N/µm, and damping, N/(m/s).
+const MAX_GANTRY: (f64, f64) = (1e6, 1e9);
 /// Maximum horizon of predictive control and maximum preview of T, position cycles.
 pub const MAX_HORIZON: i64 = 200;
 /// Range of the plant deviation factors.
@@ -102,6 +106,11 @@ const fn tolerance(key: &'static str, unit: &'static str, max: f64) -> Parameter
     ParameterDefinition::number(key, unit, 0.0, max).default(Number(0.0)).live()
 }
 
+/// Defines a principal moment of inertia of the workpiece.
+const fn moment(key: &'static str) -> ParameterDefinition {
+    ParameterDefinition::number(key, "kg·m²", 0.0, MAX_MASS_KG).default(Number(0.0))
+}
+
 /// Defines a coordinate in the machine frame, whose origin is the home position.
 const fn coordinate(key: &'static str) -> ParameterDefinition {
     ParameterDefinition::number(key, "mm", -MAX_DISTANCE_MM, MAX_DISTANCE_MM).default(Number(0.0))
@@ -161,6 +170,25 @@ const MACHINE: &[ParameterDefinition] = &[
         .describe(
             "Gain of cross-coupled control of the linear axes, feedback of the contour error; 0 disables it.",
         ),
+    // Couplings between axes.
+    ParameterDefinition::number("workpiece.mass_kg", "kg", 0.0, MAX_MASS_KG)
+        .default(Number(0.0))
+        .describe("Mass of the workpiece on the tables of A and C, in addition to the inertias of the axes; 0 is no workpiece."),
+    coordinate("workpiece.center_of_mass_x_mm").describe("X of the center of mass of the workpiece, in the workpiece frame."),
+    coordinate("workpiece.center_of_mass_y_mm").describe("Y of the center of mass of the workpiece, in the workpiece frame."),
+    coordinate("workpiece.center_of_mass_z_mm").describe("Z of the center of mass of the workpiece, in the workpiece frame."),
+    moment("workpiece.inertia_x_kg_m2").describe("Principal moment of inertia about the center of mass, parallel to X of the workpiece frame."),
+    moment("workpiece.inertia_y_kg_m2").describe("Principal moment of inertia about the center of mass, parallel to Y of the workpiece frame."),
+    moment("workpiece.inertia_z_kg_m2").describe("Principal moment of inertia about the center of mass, parallel to Z of the workpiece frame."),
+    ParameterDefinition::new("gantry.axes", "", ParameterKind::TextList)
+        .optional()
+        .describe("Names of the two linear axes of a gantry, which a beam couples."),
+    ParameterDefinition::number("gantry.stiffness_n_um", "N/µm", 0.0, MAX_GANTRY.0)
+        .default(Number(0.0))
+        .describe("Stiffness of the beam between the positions of both axes of the gantry."),
+    ParameterDefinition::number("gantry.damping_n_s_m", "N/(m/s)", 0.0, MAX_GANTRY.1)
+        .default(Number(0.0))
+        .describe("Damping of the beam between the velocities of both axes of the gantry."),
 ];
 
 /// Parameters of the controllers and limits of an axis.

@@ -18,6 +18,7 @@ mod plant;
 mod presliding;
 mod response;
 mod transmission;
+mod workpiece_dynamics;
 
 pub use event_driven::{ContactState, EventDrivenTransmission};
 pub use friction::Friction;
@@ -28,6 +29,7 @@ pub use motor::{Motor, MotorState};
 pub use plant::{Plant, Torques};
 pub use presliding::Presliding;
 pub use transmission::{LoadState, Transmission};
+pub use workpiece_dynamics::{STANDARD_GRAVITY, WorkpieceDynamics};
 
 use crate::units::Rounded;
 

@@ -15,6 +15,7 @@ use crate::units::seconds;
 
 use super::compensation::FrictionCompensation;
 use super::controller::{create_position_controller, feedforward_config};
+use super::coupling::CouplingTorques;
 use super::inner_loops::{InnerLoopInputs, InnerLoopState, InnerLoops, TickRecord, ZeroOrderHold};
 use super::{AxisError, AxisSample};
 
@@ -30,6 +31,8 @@ pub struct AxisParameters {
     pub(super) compensation: Option<FrictionCompensation>,
     /// True if the axis is one of those of cross-coupled control.
     pub(super) has_contour_control: bool,
+    /// True if the axis is one of those of a mechanical coupling.
+    pub(super) is_coupled: bool,
     delays: Delays,
     backlash_compensation: BacklashCompensation,
     /// Weight of the wind-up in the angle that the position controller reads: 1 with an encoder at the load, else 0.
@@ -109,6 +112,7 @@ impl AxisParameters {
             ),
             compensation,
             has_contour_control: false,
+            is_coupled: false,
             position_delay: TickDelay::new(delays.position, ticks),
             velocity_delay: TickDelay::new(delays.velocity, ticks),
             torque_delay: TickDelay::new(delays.torque, ticks),
@@ -152,23 +156,25 @@ pub struct Axis {
     inputs: InnerLoopInputs,
     /// Load torque over the last tick of the previous position cycle, N·m at the motor.
     previous_load: f64,
+    pub(super) coupling_torques: CouplingTorques,
     sample: AxisSample,
 }
 
 impl Axis {
     /// Creates an axis at rest with the encoder of the position controller at `position` (m or rad), and with the motor
-    /// current that holds it against gravity. With an encoder at the motor, gravity displaces an elastic load.
-    pub(super) fn at_rest(p: &AxisParameters, position: f64) -> (Self, InnerLoopState) {
+    /// current that holds it against gravity and `coupling_torque`, N·m at the motor towards plus. With an encoder at the motor, gravity displaces an elastic load.
+    pub(super) fn at_rest(p: &AxisParameters, position: f64, coupling_torque: f64) -> (Self, InnerLoopState) {
         let angle = position / p.transmission_ratio;
         let plant = &p.loops.plant;
         let gravity = plant.gravity_torque(angle);
+        let holding = gravity - coupling_torque;
         let (wind_up, contact) = match &p.event_driven {
-            Some(transmission) => transmission.at_rest(gravity),
-            None => (plant.transmission.wind_up_at_rest(gravity), ContactState::default()),
+            Some(transmission) => transmission.at_rest(holding),
+            None => (plant.transmission.wind_up_at_rest(holding), ContactState::default()),
         };
-        let current = gravity / plant.torque_constant();
+        let current = holding / plant.torque_constant();
         // The drive assumes its own Kt.
-        let torque = gravity * (p.torque_constant / plant.torque_constant());
+        let torque = holding * (p.torque_constant / plant.torque_constant());
         let voltage = p.resistance * current;
         let state = InnerLoopState {
             motor: MotorState { current, speed: 0.0, angle: angle + p.wind_up_feedback * wind_up },
@@ -190,6 +196,7 @@ impl Axis {
             position: PositionState::at_rest(angle),
             inputs: InnerLoopInputs::default(),
             previous_load: 0.0,
+            coupling_torques: CouplingTorques::new(p.is_coupled, p.ticks_per_position, coupling_torque),
             sample: AxisSample { psec: position, delayed_psec: position, ..AxisSample::default() },
         };
         let record = TickRecord { current_setpoint: current, voltage, gravity, ..TickRecord::default() };
@@ -218,6 +225,9 @@ impl Axis {
             state.filters = p.loops.filters.at_rest(state.current_setpoint);
         }
         self.psec.set_window(p.setpoint_window());
+        if old.is_coupled != p.is_coupled {
+            self.coupling_torques = CouplingTorques::new(p.is_coupled, p.ticks_per_position, 0.0);
+        }
         if (&old.position, &old.feedforward) != (&p.position, &p.feedforward) {
             self.position.begin_transfer();
         }
@@ -228,10 +238,16 @@ impl Axis {
     pub(super) fn code(&mut self, codec: &mut StateCodec<'_>) {
         codec.numbers([&mut self.load, &mut self.velocity_offset, &mut self.previous_load]);
         self.backlash_offset.code(codec);
+        codec.numbers(self.coupling_torques.values_mut());
         self.psec.code(codec);
         self.position.code(codec);
         self.inputs = self.inputs.map(&mut |value| codec.number(*value));
         self.sample.code(codec);
+    }
+
+    /// Returns the torque of the external load, N·m at the motor.
+    pub(super) fn external_torque(&self) -> f64 {
+        self.inputs.load
     }
 
     pub(super) fn set_load(&mut self, load: f64) {
@@ -316,6 +332,7 @@ impl Axis {
         let velocity_setpoint = finite.clamp(-p.max_speed, p.max_speed);
         self.position.record(velocity_setpoint + feedforward);
         self.previous_load = self.inputs.load;
+        self.coupling_torques.begin_cycle();
         self.inputs = InnerLoopInputs {
             velocity_setpoint,
             velocity_excess: if unlimited.is_finite() {
@@ -352,7 +369,13 @@ impl Axis {
         record: &TickRecord,
     ) {
         let load = if tick == 0 { self.previous_load } else { self.inputs.load };
+        let load = self.with_coupling(load, tick);
         self.sample = self.sample_with(p, tick, state, record, load);
+    }
+
+    /// Returns `load` and the torque of the coupling over the tick before `tick`, N·m at the motor.
+    fn with_coupling(&self, load: f64, tick: usize) -> f64 {
+        self.coupling_torques.before(tick).map_or(load, |torque| load + torque)
     }
 
     /// Returns the signals with the controller outputs of a tick; `load` is that over the tick before the state, N·m at
@@ -403,7 +426,8 @@ impl Axis {
         record: &TickRecord,
     ) -> AxisSample {
         let record = TickRecord { friction: state.friction, gravity: state.gravity, ..*record };
-        self.sample_with(p, tick, &(state.motor, state.load), &record, self.inputs.load)
+        let load = self.with_coupling(self.inputs.load, tick + 1);
+        self.sample_with(p, tick, &(state.motor, state.load), &record, load)
     }
 
     /// Returns the signals at the start of the last position cycle, or at the tick that

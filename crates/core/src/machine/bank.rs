@@ -181,17 +181,36 @@ impl AxisBank {
         with_lane!(&mut self.blocks, axis, block_and_lane_mut, |block, lane| block.code(lane, ticks, codec));
     }
 
-    /// Runs one position cycle; `record_all` records every tick, otherwise the first one only.
-    pub fn run(&mut self, record_all: bool) {
-        self.run_span(TickSpan::whole(self.ticks, record_all));
-    }
-
     /// Runs ticks of a position cycle; spans of one cycle follow each other.
     pub fn run_span(&mut self, span: TickSpan) {
         let ticks = self.ticks;
         match &mut self.blocks {
             AxisBlocks::X4(blocks) => run_blocks(self.width, BlockRun { blocks, ticks, span }),
             AxisBlocks::X8(blocks) => run_blocks(self.width, BlockRun { blocks, ticks, span }),
+        }
+    }
+
+    /// Stores the state of all axes at the start of a tick that can be repeated.
+    pub fn store_start(&mut self) {
+        match &mut self.blocks {
+            AxisBlocks::X4(blocks) => blocks.iter_mut().for_each(AxisBlock::store_start),
+            AxisBlocks::X8(blocks) => blocks.iter_mut().for_each(AxisBlock::store_start),
+        }
+    }
+
+    /// Restores the state of all axes at the start of the tick.
+    pub fn restore_start(&mut self) {
+        match &mut self.blocks {
+            AxisBlocks::X4(blocks) => blocks.iter_mut().for_each(AxisBlock::restore_start),
+            AxisBlocks::X8(blocks) => blocks.iter_mut().for_each(AxisBlock::restore_start),
+        }
+    }
+
+    /// Discards the stored state, at the end of the tick.
+    pub fn discard_start(&mut self) {
+        match &mut self.blocks {
+            AxisBlocks::X4(blocks) => blocks.iter_mut().for_each(AxisBlock::discard_start),
+            AxisBlocks::X8(blocks) => blocks.iter_mut().for_each(AxisBlock::discard_start),
         }
     }
 

@@ -194,6 +194,15 @@ impl TickSpan {
     }
 }
 
+/// State of a block at the start of a tick.
+#[derive(Debug, Clone, PartialEq)]
+struct TickStart<const L: usize> {
+    state: Aligned<InnerLoopState<[f64; L]>>,
+    friction_expansion: Aligned<FrictionExpansion<[f64; L]>>,
+    gravity_expansion: Aligned<GravityExpansion<[f64; L]>>,
+    span_state: Aligned<SpanState<[f64; L]>>,
+}
+
 /// Parameters, inputs, state and results of `L` axes, one per SIMD lane.
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
@@ -230,6 +239,8 @@ pub(super) struct AxisBlock<const L: usize> {
     pub loads: Vec<Aligned<LoadState<[f64; L]>>>,
     /// Record of the first tick, or of each tick if all are recorded.
     pub records: Vec<Aligned<TickRecord<[f64; L]>>>,
+    /// State at the start of a tick that can be repeated; empty at other times.
+    start: Vec<TickStart<L>>,
 }
 
 impl<const L: usize> AxisBlock<L> {
@@ -254,6 +265,7 @@ impl<const L: usize> AxisBlock<L> {
             motors: vec![Aligned(MotorState::default().fill()); ticks.position],
             loads: Vec::new(),
             records: vec![Aligned(TickRecord::default().fill())],
+            start: Vec::new(),
         }
     }
 
@@ -308,6 +320,32 @@ impl<const L: usize> AxisBlock<L> {
     /// Sets the load torque of a lane for the rest of the position cycle, N·m at the motor.
     pub fn set_load_torque(&mut self, lane: usize, torque: f64) {
         self.inputs.0.load[lane] = torque;
+    }
+
+    /// Stores the state at the start of a tick that can be repeated.
+    pub fn store_start(&mut self) {
+        self.start.clear();
+        self.start.push(TickStart {
+            state: self.state.clone(),
+            friction_expansion: self.friction_expansion.clone(),
+            gravity_expansion: self.gravity_expansion.clone(),
+            span_state: self.span_state.clone(),
+        });
+    }
+
+    /// Restores the state at the start of the tick.
+    pub fn restore_start(&mut self) {
+        if let Some(start) = self.start.last() {
+            self.state.clone_from(&start.state);
+            self.friction_expansion.clone_from(&start.friction_expansion);
+            self.gravity_expansion.clone_from(&start.gravity_expansion);
+            self.span_state.clone_from(&start.span_state);
+        }
+    }
+
+    /// Discards the state at the start of the tick.
+    pub fn discard_start(&mut self) {
+        self.start.clear();
     }
 
     /// Sets the parameters of a lane.

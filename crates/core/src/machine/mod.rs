@@ -9,6 +9,8 @@ mod closed_loop;
 mod compensation;
 mod contour_control;
 mod controller;
+mod coupled_ticks;
+mod coupling;
 mod inner_loops;
 mod loop_responses;
 mod prediction;
@@ -33,6 +35,7 @@ use crate::units::{Nanoseconds, POSITION_GAIN, Rounded};
 
 use bank::AxisBank;
 use contour_control::ContourControl;
+use coupling::{AxisCoupling, CouplingStep};
 use inner_loops::{CycleTicks, InnerLoops, TickSpan};
 
 /// Error of building a machine or changing its parameters.
@@ -81,6 +84,7 @@ pub struct MachineParameters {
     periods: Periods,
     axes: Vec<AxisParameters>,
     contour_controls: Vec<ContourControl>,
+    couplings: Vec<AxisCoupling>,
 }
 
 impl MachineParameters {
@@ -92,7 +96,8 @@ impl MachineParameters {
         Self::from_axes(config, &Vec::from_iter(0..config.axes.len()))
     }
 
-    /// Discretizes the axes of `config` at `indices` only; indices without an axis are ignored.
+    /// Discretizes the axes of `config` at `indices` only; indices without an axis are ignored. Two axes are coupled if
+    /// both are among them.
     ///
     /// # Errors
     /// [`MachineError::Axis`] with the name of the first axis that cannot be built.
@@ -109,7 +114,11 @@ impl MachineParameters {
                 contour_control.as_ref().is_some_and(|control| control.contains(index));
         }
         let contour_controls = contour_control.into_iter().collect();
-        Ok(MachineParameters { periods: config.periods, axes, contour_controls })
+        let couplings = AxisCoupling::of_machine(config, indices);
+        for axis in couplings.iter().flat_map(|coupling| coupling.axes) {
+            axes[axis].is_coupled = true;
+        }
+        Ok(MachineParameters { periods: config.periods, axes, contour_controls, couplings })
     }
 
     /// Returns the periods of the control loops.
@@ -121,13 +130,14 @@ impl MachineParameters {
     pub fn concatenate(machines: &[Arc<MachineParameters>]) -> Option<Self> {
         let periods = machines.first()?.periods;
         let is_same = machines.iter().all(|machine| machine.periods == periods);
-        let (mut axes, mut contour_controls) = (Vec::new(), Vec::new());
+        let (mut axes, mut contour_controls, mut couplings) = (Vec::new(), Vec::new(), Vec::new());
         for machine in machines {
             contour_controls
                 .extend(machine.contour_controls.iter().map(|control| control.behind(axes.len())));
+            couplings.extend(machine.couplings.iter().map(|coupling| coupling.behind(axes.len())));
             axes.extend(machine.axes.iter().cloned());
         }
-        is_same.then_some(MachineParameters { periods, axes, contour_controls })
+        is_same.then_some(MachineParameters { periods, axes, contour_controls, couplings })
     }
 
     fn cycle_ticks(&self) -> CycleTicks {
@@ -179,33 +189,45 @@ pub struct Machine {
     axes: Vec<Axis>,
     bank: AxisBank,
     tick: u64,
+    /// Forces of the couplings within a tick; empty between two ticks.
+    coupling_steps: Vec<CouplingStep>,
 }
 
 impl Machine {
     /// Creates a machine at rest at home (0 on every axis).
     pub fn new(parameters: Arc<MachineParameters>) -> Self {
-        let (axes, states): (Vec<_>, Vec<_>) = parameters.axes.iter().map(|p| Axis::at_rest(p, 0.0)).unzip();
+        let at_home = |(index, p): (usize, &AxisParameters)| {
+            Axis::at_rest(p, 0.0, parameters.coupling_torque_at_rest(index, |_| 0.0))
+        };
+        let (axes, states): (Vec<_>, Vec<_>) = parameters.axes.iter().enumerate().map(at_home).unzip();
         let mut bank = parameters.bank();
         for (axis, state) in states.iter().enumerate() {
             bank.set_state(axis, state);
         }
-        Machine { axes, bank, parameters, tick: 0 }
+        Machine { axes, bank, parameters, tick: 0, coupling_steps: Vec::new() }
     }
 
     /// Resets the machine to rest at `positions` (m or rad, one per axis) and tick 0.
     pub fn reset(&mut self, positions: &[f64]) {
         for (index, &position) in positions.iter().enumerate() {
-            self.reset_axis(index, position);
+            self.reset_one(index, position, |axis| positions.get(axis).copied());
         }
         self.tick = 0;
     }
 
     /// Resets one axis to rest at `position`, m or rad; the tick and the other axes go on.
     pub fn reset_axis(&mut self, index: usize, position: f64) {
+        self.reset_one(index, position, |axis| (axis == index).then_some(position));
+    }
+
+    /// Resets one axis; `next` returns the next positions of the axes that are reset, m or rad.
+    fn reset_one(&mut self, index: usize, position: f64, next: impl Fn(usize) -> Option<f64>) {
+        let at = |axis| next(axis).unwrap_or_else(|| self.motion_at_end(axis)[0]);
+        let coupling_torque = self.parameters.coupling_torque_at_rest(index, at);
         let (Some(axis), Some(p)) = (self.axes.get_mut(index), self.parameters.axes.get(index)) else {
             return;
         };
-        let (at_rest, state) = Axis::at_rest(p, position);
+        let (at_rest, state) = Axis::at_rest(p, position, coupling_torque);
         *axis = at_rest;
         self.bank.set_state(index, &state);
     }
@@ -316,7 +338,7 @@ impl Machine {
             return self.advance_ticks(self.ticks_per_period(), psec, preview);
         }
         self.execute_position_loops(psec, preview);
-        self.bank.run(false);
+        self.run(TickSpan::whole(self.parameters.cycle_ticks(), false));
         self.update_samples(0);
         self.tick += self.parameters.periods.ticks_per_position();
     }
@@ -327,7 +349,7 @@ impl Machine {
     /// of the tick. Afterwards they are those at the start of the position cycle.
     pub fn advance_with(&mut self, psec: &[f64], preview: &[f64], mut observe: impl FnMut(&Machine)) {
         self.execute_position_loops(psec, preview);
-        self.bank.run(true);
+        self.run(TickSpan::whole(self.parameters.cycle_ticks(), true));
         for tick in 0..self.parameters.periods.ticks_per_position() {
             self.update_samples(tick as usize);
             observe(self);
@@ -355,7 +377,7 @@ impl Machine {
                 }
             }
             let end = period.min(first + left);
-            self.bank.run_span(TickSpan { first, end, record_all: true });
+            self.run(TickSpan { first, end, record_all: true });
             self.tick += (end - first) as u64;
             left -= end - first;
         }

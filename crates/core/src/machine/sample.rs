@@ -34,7 +34,7 @@ pub struct AxisSample {
     pub friction_current: f64,
     /// Gravity over the previous tick, as motor current, A.
     pub gravity_current: f64,
-    /// External load over the previous tick, as motor current, A; positive against motion towards plus, like
+    /// External load and force of a coupling over the previous tick, as motor current, A; positive against motion towards plus, like
     /// friction and gravity.
     pub load_current: f64,
     /// Motor force or torque at the axis, `Kt i / r`, N or N·m.

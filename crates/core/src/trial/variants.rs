@@ -67,7 +67,7 @@ impl<'a> VariantBatch<'a> {
 
 /// Runs `setpoints` on each of `variants` and returns their figures.
 ///
-/// The variants differ from the trial's machine only in the axes at `own`, not in periods or delays. The
+/// The variants differ from the trial's machine only in the axes at `own`, not in periods, delays or couplings. The
 /// figures of each are those of [`run`](super::run). `callback` is called at every position cycle.
 ///
 /// # Errors
@@ -79,6 +79,7 @@ pub fn run_variants(
     own: &[usize],
     callback: impl Fn() -> io::Result<()>,
 ) -> Result<Vec<Figures>, TrialError> {
+    let own = &*trial.machine.with_coupled_axes(own);
     let (mut base, mut submitter, start) = start(trial, setpoints)?;
     let Some(mut batch) = VariantBatch::new(trial, variants, own, &start)? else { return Ok(Vec::new()) };
     let mut observers = vec![Observer::new(trial, &start); variants.len()];

@@ -30,6 +30,11 @@ pub enum LearningError {
         "contour_control.gain must be 0 to learn: the convergence is computed for axes without cross-coupled control"
     )]
     ContourControl,
+    /// Machine with axes that are coupled mechanically, which the closed loops of single axes do not contain.
+    #[error(
+        "workpiece.mass_kg must be 0 and gantry.axes absent to learn: the convergence is computed for independent axes"
+    )]
+    CoupledAxes,
     /// Path without motion of any axis.
     #[error("no axis moves: there is nothing to learn")]
     NothingMoves,

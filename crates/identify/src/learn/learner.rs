@@ -37,6 +37,9 @@ impl<'a> Learner<'a> {
         if machine.contour_gain() > 0.0 {
             return Err(LearningError::ContourControl);
         }
+        if machine.has_coupled_axes() {
+            return Err(LearningError::CoupledAxes);
+        }
         let periods = machine.periods();
         let all = machine.axes().iter().enumerate().zip(&figures.axes);
         let moving: Vec<(usize, &AxisConfig)> =

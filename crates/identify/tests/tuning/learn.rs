@@ -1,6 +1,6 @@
 //! Iterative learning: runs, convergence, limits, deviating plants.
 
-use virtual_axes_core::config::{MachineConfig, Parameters, Value, ValueSource};
+use virtual_axes_core::config::{MachineConfig, Parameters, Value, ValueSource, parse_assignment};
 use virtual_axes_core::design::LearningTuning;
 use virtual_axes_core::trial::{GridRows, Measures, SetpointSource, Trial, run, run_compensated};
 use virtual_axes_identify::learn::{
@@ -194,6 +194,14 @@ fn invalid_options_and_idle_machines_are_rejected() {
     let contour = contour.machine_config().expect("a machine");
     let error = learn(&contour, &path, &OPTIONS, false, false, &NoProgress).expect_err("an error");
     assert!(error.to_string().starts_with("contour_control.gain must be 0"), "{error}");
+    let mut gantry = machine(&["x", "y"]);
+    let source = ValueSource::named("test");
+    let assignments = ["gantry.axes=[x, y]", "gantry.stiffness_n_um=100"]
+        .map(|text| parse_assignment(text, &source).expect("an assignment"));
+    gantry.set_all(assignments.into()).expect("parameters");
+    let gantry = gantry.machine_config().expect("a machine");
+    let error = learn(&gantry, &path, &OPTIONS, false, false, &NoProgress).expect_err("an error");
+    assert!(error.to_string().starts_with("workpiece.mass_kg must be 0 and gantry.axes absent"), "{error}");
     let rest = [0.0; 40];
     let idle = SetpointSource::Grid(Box::new(GridRows::new(&[0, 1], &rest)));
     let idle = Workload::read("rest", None, idle, || Ok(())).expect("rows");

@@ -47,6 +47,15 @@ pub enum TestMachinesError {
         /// Parameters that it comes from.
         keys: &'static str,
     },
+    /// Machine with axes that are coupled mechanically, which the independent checks do not contain.
+    #[error(
+        "{machine}: axes are coupled, the checks of the stress test are those of the paper's model; remove the \
+         parameters workpiece and gantry"
+    )]
+    Coupled {
+        /// Name of the machine.
+        machine: String,
+    },
     /// The position cycle of a machine has too many ticks.
     #[error(
         "{machine}: a position cycle has {ticks} current cycles, at most {most} are allowed in the stress test",
@@ -230,6 +239,9 @@ impl TestMachines {
             let ticks = config.periods().ticks_per_position() as usize;
             if ticks * MIN_PERIODS > MAX_TICKS {
                 return Err(TestMachinesError::Ticks { machine: config.name().to_owned(), ticks });
+            }
+            if config.has_coupled_axes() {
+                return Err(TestMachinesError::Coupled { machine: config.name().to_owned() });
             }
             config.axes().iter().try_for_each(|axis| reject_extended(config.name(), axis))?;
             for (name, laws) in VARIANTS {

@@ -1,6 +1,7 @@
 //! Tests of the configuration: rejected files and values, accepted values, built-in machines.
 
 mod backlash;
+mod couplings;
 mod machines;
 mod rejected_files;
 mod rejected_values;

@@ -1,0 +1,83 @@
+//! Validation of the couplings between axes: workpiece on two tables, gantry.
+
+use super::check::{CrossChecks, missing};
+use super::error::{ConfigError, ValueSource};
+use super::machine::AxisKind;
+use super::value::Value;
+
+pub(super) const WORKPIECE_MASS: &str = "workpiece.mass_kg";
+pub(super) const CENTER_OF_MASS: [&str; 3] =
+    ["workpiece.center_of_mass_x_mm", "workpiece.center_of_mass_y_mm", "workpiece.center_of_mass_z_mm"];
+pub(super) const MOMENTS: [&str; 3] =
+    ["workpiece.inertia_x_kg_m2", "workpiece.inertia_y_kg_m2", "workpiece.inertia_z_kg_m2"];
+pub(super) const GANTRY_AXES: &str = "gantry.axes";
+pub(super) const GANTRY_STIFFNESS: &str = "gantry.stiffness_n_um";
+pub(super) const GANTRY_DAMPING: &str = "gantry.damping_n_s_m";
+
+impl CrossChecks<'_> {
+    fn is_nonzero(&self, key: &str) -> bool {
+        self.number(key).is_some_and(|value| value != 0.0)
+    }
+
+    /// Checks that a workpiece has a mass, possible moments of inertia and two tables to lie on.
+    pub(super) fn check_workpiece(&self, origin: &ValueSource) -> Result<(), ConfigError> {
+        if !self.is_nonzero(WORKPIECE_MASS) {
+            let other = CENTER_OF_MASS.into_iter().chain(MOMENTS).find(|key| self.is_nonzero(key));
+            return match other {
+                Some(key) => {
+                    Err(missing(origin, WORKPIECE_MASS, format!("expected it above 0 beside {key}")))
+                }
+                None => Ok(()),
+            };
+        }
+        let has_table = |name: &str| {
+            self.layout
+                .joints
+                .iter()
+                .any(|joint| joint.axis == AxisKind::Rotary && joint.name.eq_ignore_ascii_case(name))
+        };
+        if !has_table("a") || !has_table("c") {
+            let allowed = "be 0 on a machine without rotary joints a and c, which carry the workpiece";
+            return Err(self.rejection(&[WORKPIECE_MASS], allowed.to_owned()));
+        }
+        let moments = MOMENTS.map(|key| self.number(key).unwrap_or_default());
+        let sum: f64 = moments.iter().sum();
+        if moments.iter().any(|moment| *moment > (sum - moment) * (1.0 + 1e-9)) {
+            let allowed = format!("keep each of {} at most the sum of the other two", MOMENTS.join(", "));
+            return Err(self.rejection(&MOMENTS, allowed));
+        }
+        Ok(())
+    }
+
+    /// Checks that a gantry has two linear joints and a stiffness.
+    pub(super) fn check_gantry(&self, origin: &ValueSource) -> Result<(), ConfigError> {
+        let Some(entry) = self.entries.get(GANTRY_AXES) else {
+            return match [GANTRY_STIFFNESS, GANTRY_DAMPING].into_iter().find(|key| self.is_nonzero(key)) {
+                Some(key) => {
+                    Err(missing(origin, GANTRY_AXES, format!("expected two linear joints beside {key}")))
+                }
+                None => Ok(()),
+            };
+        };
+        let is_linear = |name: &String| {
+            self.layout.joints.iter().any(|joint| joint.axis == AxisKind::Linear && joint.name == *name)
+        };
+        let is_pair = match &entry.value {
+            Value::TextList(names) => {
+                matches!(&names[..], [first, second] if first != second) && names.iter().all(is_linear)
+            }
+            _ => false,
+        };
+        if !is_pair {
+            let linear = self.layout.joints.iter().filter(|joint| joint.axis == AxisKind::Linear);
+            let names: Vec<&str> = linear.map(|joint| joint.name.as_str()).collect();
+            let allowed = format!("contain two different linear joints, found linear: {}", names.join(", "));
+            return Err(self.rejection(&[GANTRY_AXES], allowed));
+        }
+        if !self.is_nonzero(GANTRY_STIFFNESS) {
+            let wanted = format!("expected it above 0 beside {GANTRY_AXES}");
+            return Err(missing(origin, GANTRY_STIFFNESS, wanted));
+        }
+        Ok(())
+    }
+}
