@@ -7,12 +7,12 @@
 //! sum of the squared residuals over this length has a minimum, whose scatter without each of the reversals in turn
 //! (jackknife) is the uncertainty.
 
-use super::fit::fit_linear;
-use super::friction::speed_unit;
-use super::reversals::{Leg, ReversingMotion};
-use rayon::prelude::*;
+mod profile;
+mod reversal;
 
-use crate::recording::{Finding, GaussianFilter, SignalSpan, Signals, deviation};
+use self::profile::{LengthProfile, student};
+use self::reversal::{Reversal, SpanMotion};
+use crate::recording::{Finding, GaussianFilter, Signals, deviation};
 use virtual_axes_core::config::{AxisConfig, AxisKind, PreslidingConfig};
 use virtual_axes_core::statistics::{mean, median};
 use virtual_axes_core::units::{NEWTON_PER_MICROMETER, Rounded};
@@ -136,95 +136,8 @@ fn few_reversals(count: usize) -> Finding {
     )
 }
 
-/// Span with current and its turning points.
-struct SpanMotion<'a> {
-    signals: &'a Signals,
-    motion: ReversingMotion,
-    /// Recorded position, m or rad.
-    position: &'a [f64],
-    /// Recorded current without gravity, A.
-    current: Vec<f64>,
-    /// Inertia as current per acceleration, A/(m/s²) or A/(rad/s²).
-    inertia: f64,
-    /// Friction current of the law at the speed of each sample, A.
-    law: Vec<f64>,
-}
-
-impl<'a> SpanMotion<'a> {
-    fn new(span: &'a SignalSpan, signals: &'a Signals, axis: &AxisConfig) -> Option<Self> {
-        let current = span.current.as_deref()?;
-        let motion = ReversingMotion::new(span, signals)?;
-        let (law, unit) = (&axis.friction, speed_unit(axis));
-        let of = |velocity: &f64| {
-            let v = velocity.abs() / unit;
-            law.a * (law.b * v).exp() + law.c * (law.d * v).exp()
-        };
-        let law: Vec<f64> = span.velocity.iter().map(of).collect();
-        let least = 1e-3 * law.iter().copied().fold(0.0, f64::max);
-        let (kt, ratio) = (axis.motor.torque_constant, axis.transmission_ratio);
-        let weight =
-            |x: &f64| (axis.gravity.weight + axis.gravity.tilt * (x + axis.gravity.phase).sin()) * ratio / kt;
-        (least > 0.0).then(|| SpanMotion {
-            current: current.iter().zip(&span.position).map(|(i, x)| i - weight(x)).collect(),
-            position: &span.position,
-            inertia: axis.motor.inertia / (kt * ratio),
-            signals,
-            motion,
-            law: law.into_iter().map(|level| level.max(least)).collect(),
-        })
-    }
-
-    /// Returns the filtered current without gravity and inertia at a sample, A.
-    fn friction_at(&self, filter: &GaussianFilter, index: usize) -> Option<f64> {
-        let acceleration = filter.second_at(self.position, index)?;
-        Some(filter.value_at(&self.current, index)? - self.inertia * acceleration)
-    }
-
-    /// Returns the current of the bristles, A, and its rate, A/s, on two legs, for a stiffness, A/m or A/rad.
-    fn bristles(&self, legs: [&Leg; 2], stiffness: f64) -> [Vec<f64>; 2] {
-        let first = legs[0].begin;
-        let count = legs[1].end - first;
-        let (mut force, mut rate) = (vec![0.0; count], vec![0.0; count]);
-        let mut present = -legs[0].direction * self.law[first];
-        force[0] = present;
-        for leg in legs {
-            for i in leg.begin + 1..leg.end {
-                let level = leg.direction * self.law[i];
-                let next =
-                    level + (present - level) * (-stiffness * self.motion.steps[i] / self.law[i]).exp();
-                rate[i - first] = (next - present) / self.signals.period;
-                present = next;
-                force[i - first] = present;
-            }
-        }
-        [force, rate]
-    }
-}
-
-/// Reversal between two legs of a span.
-#[derive(Clone, Copy)]
-struct Reversal<'a> {
-    /// Index of the span.
-    span: usize,
-    before: &'a Leg,
-    after: &'a Leg,
-    /// Shorter travel of the two legs, m or rad.
-    travel: f64,
-    /// Shortest length that the samples after the reversal resolve, m or rad.
-    resolved: f64,
-}
-
-/// Linear fit of one reversal at one length.
-struct ReversalFit {
-    squares: f64,
-    /// Friction level relative to the law; damping, A/(m/s) or A/(rad/s).
-    level: f64,
-    damping: f64,
-}
-
 /// Search for the length of presliding.
 struct LengthSearch<'a> {
-    motions: &'a [SpanMotion<'a>],
     axis: &'a AxisConfig,
     reversals: Vec<Reversal<'a>>,
     /// Friction current at the reversals, A.
@@ -235,14 +148,15 @@ impl<'a> LengthSearch<'a> {
     /// Collects the reversals; none without reversals.
     fn new(motions: &'a [SpanMotion<'a>], axis: &'a AxisConfig) -> Option<Self> {
         let mut reversals = Vec::new();
-        for (span, SpanMotion { motion, signals, .. }) in motions.iter().enumerate() {
+        for of_span in motions {
+            let SpanMotion { motion, signals, .. } = of_span;
             for pair in motion.legs.windows(2) {
                 let (before, after) = (&pair[0], &pair[1]);
                 let width = 2.0 * deviation(signals.cutoff) / signals.period;
                 let samples = SAMPLES.max(width.ceil() as usize).min(after.end - after.begin);
                 let passed: f64 = motion.steps[after.begin..after.begin + samples].iter().sum();
                 reversals.push(Reversal {
-                    span,
+                    motion: of_span,
                     before,
                     after,
                     travel: motion.travel(before).min(motion.travel(after)),
@@ -250,9 +164,9 @@ impl<'a> LengthSearch<'a> {
                 });
             }
         }
-        let levels = reversals.iter().map(|r| motions[r.span].law[r.after.begin]);
+        let levels = reversals.iter().map(|r| r.motion.law[r.after.begin]);
         let level = median(&mut levels.collect::<Vec<_>>())?;
-        Some(LengthSearch { motions, axis, reversals, level })
+        Some(LengthSearch { axis, reversals, level })
     }
 
     fn fit(&self) -> Result<PreslidingFit, Undetermined> {
@@ -275,7 +189,7 @@ impl<'a> LengthSearch<'a> {
                 return Err(Undetermined::of(few_reversals(chosen.len())));
             }
             let grid = ([BELOW * shortest, longest], COARSE);
-            let profile = LengthProfile::new(self, &chosen, length.max(shortest), grid);
+            let profile = LengthProfile::new(self.level, &chosen, length.max(shortest), grid);
             let next = profile.minimum(None).0;
             let is_settled = (next / length - 1.0).abs() < SETTLED;
             length = next;
@@ -304,13 +218,13 @@ impl<'a> LengthSearch<'a> {
         [shortest, longest]: [f64; 2],
     ) -> Result<PreslidingFit, Undetermined> {
         let range = [(length / 2.0).max(BELOW * shortest), (2.0 * length).min(longest)];
-        let profile = LengthProfile::new(self, chosen, length.max(shortest), (range, FINE));
+        let profile = LengthProfile::new(self.level, chosen, length.max(shortest), (range, FINE));
         let (length, stiffness) = profile.minimum(None);
         let count = chosen.len();
         let without: Vec<f64> = (0..count).map(|k| profile.minimum(Some(k)).1.ln()).collect();
         let middle = mean(&without).unwrap_or(f64::NAN);
         let scatter: f64 = without.iter().map(|x| (x - middle) * (x - middle)).sum();
-        let increment = chosen.iter().map(|r| self.motions[r.span].motion.increment).fold(0.0, f64::max);
+        let increment = chosen.iter().map(|r| r.motion.motion.increment).fold(0.0, f64::max);
         let shared = SYSTEMATIC.hypot(OF_INCREMENT * increment / length);
         let error = (scatter * (count - 1) as f64 / count as f64).sqrt();
         let half = (student(count - 1) * error).hypot(INTERVAL * shared);
@@ -370,42 +284,9 @@ impl<'a> LengthSearch<'a> {
         }
     }
 
-    /// Fits one reversal at each of the trial lengths.
-    fn fit_reversal(
-        &self,
-        reversal: &Reversal<'_>,
-        length: f64,
-        lengths: &[f64],
-        cutoff: f64,
-    ) -> Vec<ReversalFit> {
-        let Reversal { before, after, span, .. } = reversal;
-        let motion = &self.motions[*span];
-        let cutoff = cutoff.min(motion.signals.cutoff);
-        let filter = GaussianFilter::new(cutoff, motion.signals.period);
-        let from = after.begin - motion.motion.samples_before_end(before, WINDOW * length);
-        let to = after.begin + motion.motion.samples_within(after, WINDOW * length);
-        // Samples closer than half a standard deviation of the filter are nearly equal.
-        let every = (0.5 * deviation(cutoff) / motion.signals.period).max(1.0) as usize;
-        let first = before.begin;
-        let measured = |i: usize| motion.friction_at(&filter, i);
-        let rows: Vec<(usize, f64)> =
-            (from..to).step_by(every).filter_map(|i| Some((i - first, measured(i)?))).collect();
-        let at = |trial: &f64| {
-            let stiffness = self.level / trial;
-            let [force, rate] = motion.bristles([before, after], stiffness);
-            let row = |&(i, measured): &(usize, f64)| {
-                let (force, rate) = (filter.value_at(&force, i)?, filter.value_at(&rate, i)?);
-                Some((vec![1.0, force, rate / stiffness], measured, 1.0))
-            };
-            ReversalFit::new(&rows.iter().filter_map(row).collect::<Vec<_>>())
-        };
-        lengths.iter().map(at).collect()
-    }
-
     /// Returns distance, measured and modeled current after a reversal.
     fn curve(&self, reversal: &Reversal<'_>, length: f64, cutoff: f64) -> Vec<[f64; 3]> {
-        let Reversal { span, before, after, .. } = *reversal;
-        let motion = &self.motions[span];
+        let Reversal { motion, before, after, .. } = *reversal;
         let filter = GaussianFilter::new(cutoff.min(motion.signals.cutoff), motion.signals.period);
         let [force, _] = motion.bristles([before, after], self.level / length);
         let count = motion.motion.samples_within(after, WINDOW * length);
@@ -417,106 +298,5 @@ impl<'a> LengthSearch<'a> {
             Some([distance, measured, modeled])
         };
         (after.begin..after.begin + count).filter_map(point).collect()
-    }
-}
-
-/// Residuals of each reversal over the trial lengths.
-struct LengthProfile {
-    lengths: Vec<f64>,
-    /// Fits of each reversal, one per length.
-    fits: Vec<Vec<ReversalFit>>,
-    level: f64,
-    /// Cut-off frequency of the filter, Hz.
-    cutoff: f64,
-    /// Median time in which an axis passes the length after a reversal, s.
-    time: f64,
-}
-
-impl LengthProfile {
-    /// Fits `chosen` reversals at trial lengths between `low` and `high`; window and filter are those of `length`.
-    fn new(
-        search: &LengthSearch<'_>,
-        chosen: &[Reversal<'_>],
-        length: f64,
-        ([low, high], per_decade): ([f64; 2], f64),
-    ) -> Self {
-        let points = ((high / low).log10() * per_decade).ceil().max(2.0) as usize;
-        let lengths: Vec<f64> =
-            (0..=points).map(|k| low * (high / low).powf(k as f64 / points as f64)).collect();
-        let times = chosen.iter().map(|r| {
-            let motion = &search.motions[r.span];
-            motion.motion.samples_within(r.after, length) as f64 * motion.signals.period
-        });
-        let time = median(&mut times.collect::<Vec<_>>()).unwrap_or(0.0);
-        let cutoff = deviation(1.0) / (FILTER * time).max(f64::MIN_POSITIVE);
-        let fits = chosen.par_iter().map(|r| search.fit_reversal(r, length, &lengths, cutoff)).collect();
-        LengthProfile { lengths, fits, level: search.level, cutoff, time }
-    }
-
-    /// Returns the length of the least squares and its stiffness, A/m or A/rad, without the reversal `left_out`.
-    fn minimum(&self, left_out: Option<usize>) -> (f64, f64) {
-        let used: Vec<&Vec<ReversalFit>> =
-            self.fits.iter().enumerate().filter(|(k, _)| Some(*k) != left_out).map(|(_, fit)| fit).collect();
-        let sums: Vec<f64> =
-            (0..self.lengths.len()).map(|j| used.iter().map(|fit| fit[j].squares).sum()).collect();
-        let least = (0..sums.len()).min_by(|&a, &b| sums[a].total_cmp(&sums[b])).unwrap_or(0);
-        // Vertex of the parabola through the neighbors, over the logarithm of the length.
-        let spacing = (self.lengths[1] / self.lengths[0]).ln();
-        let shift = match least {
-            0 => 0.0,
-            last if last + 1 == sums.len() => 0.0,
-            k => {
-                let bend = sums[k - 1] - 2.0 * sums[k] + sums[k + 1];
-                if bend > 0.0 { 0.5 * (sums[k - 1] - sums[k + 1]) / bend } else { 0.0 }
-            }
-        };
-        let length = self.lengths[least] * (shift * spacing).exp();
-        let level = mean(&used.iter().map(|fit| fit[least].level).collect::<Vec<_>>()).unwrap_or(f64::NAN);
-        (length, level * self.level / length)
-    }
-
-    /// Returns the damping at the trial length next to `length` with its standard error, A/(m/s) or A/(rad/s), if it is
-    /// significant. `shared` is the standard error that all reversals share.
-    fn damping(&self, length: f64, shared: f64) -> Option<(f64, f64)> {
-        let near = |j: &usize| (self.lengths[*j] / length).ln().abs();
-        let at = (0..self.lengths.len()).min_by(|a, b| near(a).total_cmp(&near(b)))?;
-        let values: Vec<f64> = self.fits.iter().map(|fit| fit[at].damping).collect();
-        let value = mean(&values)?;
-        let scatter: f64 = values.iter().map(|x| (x - value) * (x - value)).sum();
-        let error = (scatter / (values.len() * (values.len() - 1)) as f64).sqrt().hypot(shared);
-        (value > SIGNIFICANT * error).then_some((value, error))
-    }
-}
-
-impl ReversalFit {
-    fn new(rows: &[(Vec<f64>, f64, f64)]) -> Self {
-        let Some(fit) = fit_linear(rows.iter().cloned()) else {
-            let squares = rows.iter().map(|(_, y, _)| y * y).sum();
-            return ReversalFit { squares, level: f64::NAN, damping: f64::NAN };
-        };
-        let residual = |(x, y, _): &(Vec<f64>, f64, f64)| {
-            y - x.iter().zip(&fit.values).map(|(x, value)| x * value).sum::<f64>()
-        };
-        let squares = rows.iter().map(residual).map(|r| r * r).sum();
-        ReversalFit { squares, level: fit.values[1], damping: fit.values[2] }
-    }
-}
-
-/// Returns the 97.5 % quantile of Student's distribution, by the expansion of Cornish and Fisher in powers of
-/// 1 / `freedom`; the error is below 1 % from three degrees of freedom on.
-fn student(freedom: usize) -> f64 {
-    let n = freedom as f64;
-    1.959_964 + (2.372_27 + (2.822_5 + 2.555_9 / n) / n) / n
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_quantile_is_that_of_the_tables() {
-        for (freedom, table) in [(3, 3.182), (5, 2.571), (10, 2.228), (30, 2.042)] {
-            assert!((student(freedom) / table - 1.0).abs() < 0.01, "{freedom}: {}", student(freedom));
-        }
     }
 }
