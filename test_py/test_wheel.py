@@ -200,6 +200,31 @@ def test_ctrl_c_ends_a_long_simulation() -> None:
     assert process.returncode != 0 and "KeyboardInterrupt" in errors
 
 
+def test_a_frequency_response_equals_the_csv_of_the_command(machine: va.Machine) -> None:
+    done = subprocess.run([COMMAND, "bode", "--csv"], check=True, capture_output=True, text=True, timeout=120)
+    rows = list(csv.DictReader(done.stdout.splitlines()))
+    columns = ("frequency_hz", "open_db", "open_deg", "closed_db", "closed_deg")
+    for axis in machine.axes:
+        for name in ("current", "velocity", "position"):
+            found = va.design.frequency_response(machine, axis, name)
+            own = [row for row in rows if (row["axis"], row["loop"]) == (axis, name)]
+            assert len(own) > 100
+            for column in columns:
+                values = getattr(found, column)
+                assert values.dtype == np.float64
+                np.testing.assert_array_equal(values, [float(row[column]) for row in own])
+    model = va.design.model(machine, "x")
+    transfer = va.design.loop_transfer(model, va.design.of_machine(machine, "x"))
+    found = va.design.frequency_response(machine, "x")
+    inside = found.frequency_hz < 0.49 / model.period
+    expected = transfer(np.exp(2j * np.pi * found.frequency_hz[inside] * model.period))
+    np.testing.assert_allclose(found.open_db[inside], 20 * np.log10(np.abs(expected)), atol=1e-6)
+    with pytest.raises(ValueError, match="torque.*must be current, velocity or position"):
+        va.design.frequency_response(machine, "x", "torque")
+    with pytest.raises(ValueError, match="axis .w. is unknown"):
+        va.design.frequency_response(machine, "w")
+
+
 def test_margins_and_poles_equal_those_of_python_control(machine: va.Machine) -> None:
     random = np.random.default_rng(20)
     checked = 0

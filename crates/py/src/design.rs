@@ -1,14 +1,17 @@
 //! Controller design: prediction model, RST controllers, poles and margins.
 
 use num_complex::Complex64;
+use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use virtual_axes_core::config::AxisConfig;
 use virtual_axes_core::control::Rst as CoreRst;
 use virtual_axes_core::design::{
-    self, ControlWeight, GpcTuning, PidTuning, PolePlacement, PredictionModel as CoreModel,
+    self, ControlLoop, ControlWeight, GpcTuning, PidTuning, PolePlacement, PredictionModel as CoreModel,
+    continuous_phases, magnitudes_db,
 };
-use virtual_axes_core::machine::{design_controller, prediction_model};
+use virtual_axes_core::machine::{design_controller, loop_response, prediction_model};
+use virtual_axes_core::units::DEGREE;
 
 use crate::convert::value_error;
 use crate::machine::PyMachine;
@@ -18,6 +21,9 @@ type Recreation<'py, T> = (Bound<'py, PyAny>, T);
 
 /// Arguments of a controller: R, S, T and the exponent of the first coefficient of T.
 type Coefficients = (Vec<f64>, Vec<f64>, Vec<f64>, i64);
+
+/// Arrays of a frequency response by name.
+const RESPONSE: [&str; 5] = ["frequency_hz", "open_db", "open_deg", "closed_db", "closed_deg"];
 
 /// Discrete transfer function from Ω* to θ of an axis, `A(q⁻¹) θ = B(q⁻¹) Ω*`.
 #[pyclass(name = "PredictionModel", module = "virtual_axes_py._native", frozen)]
@@ -174,6 +180,37 @@ fn axis_of<'m>(machine: &'m PyMachine, name: &str) -> PyResult<&'m AxisConfig> {
 pub fn model_of(machine: &PyMachine, axis: &str) -> PyResult<PyPredictionModel> {
     let axis = axis_of(machine, axis)?;
     Ok(PyPredictionModel { model: prediction_model(axis, &machine.config.periods()).map_err(value_error)? })
+}
+
+/// Computes the frequency response of a control loop of an axis, as `virtual_axes bode --csv` writes it.
+pub fn frequency_response_of<'py>(
+    py: Python<'py>,
+    machine: &PyMachine,
+    axis: &str,
+    name: &str,
+) -> PyResult<Bound<'py, PyDict>> {
+    let axis = axis_of(machine, axis)?;
+    let control_loop = ControlLoop::ALL.into_iter().find(|one| one.name() == name).ok_or_else(|| {
+        value_error(format!("control_loop {name:?}: must be current, velocity or position"))
+    })?;
+    let response = py
+        .detach(|| loop_response(axis, &machine.config.periods(), control_loop).map(|model| model.sample()));
+    let response = response.map_err(|error| value_error(format!("axis {}: {error}", axis.name())))?;
+    let degrees = |values: &[Complex64]| -> Vec<f64> {
+        continuous_phases(values).into_iter().map(|phase| phase / DEGREE).collect()
+    };
+    let columns = [
+        response.frequencies.clone(),
+        magnitudes_db(&response.open),
+        degrees(&response.open),
+        magnitudes_db(&response.closed),
+        degrees(&response.closed),
+    ];
+    let found = PyDict::new(py);
+    for (name, column) in RESPONSE.into_iter().zip(columns) {
+        found.set_item(name, PyArray1::from_vec(py, column))?;
+    }
+    Ok(found)
 }
 
 /// Designs the controller of an axis as configured.

@@ -63,6 +63,7 @@ pub struct IdentifyOptions {
     validate_feedforward: Vec<String>,
     refine: Option<Vec<String>>,
     free_i0: bool,
+    presliding: bool,
 }
 
 impl GivenRecording<'_> {
@@ -161,7 +162,11 @@ impl IdentifyOptions {
         };
         Ok(Conditioning {
             cutoff: self.cutoff_hz,
-            current_lag: self.current_lag_ms.map(|milliseconds| milliseconds * MILLISECOND),
+            // A lag of the current cannot be told from presliding.
+            current_lag: self
+                .current_lag_ms
+                .or(self.presliding.then_some(0.0))
+                .map(|milliseconds| milliseconds * MILLISECOND),
             psec_shift,
             trace_filter: self.trace_filter_hz,
         })
@@ -228,7 +233,8 @@ pub fn identify(
     let of_others = modes(for_others, others.len(), "validate_feedforward")?;
     let reading = (&options.reading()?, &options.conditioning()?);
     let i0 = if options.free_i0 { Breakaway::Freed } else { Breakaway::Held };
-    let chosen = IdentificationOptions { i0, refine: scope(options.refine.as_ref())? };
+    let refine = scope(options.refine.as_ref())?;
+    let chosen = IdentificationOptions { i0, refine, presliding: options.presliding };
     let periods = machine.config.periods();
     let axis = (&machine.config.axes()[index], &periods);
     let stopped = AtomicBool::new(false);

@@ -157,6 +157,15 @@ impl PyMachine {
         design::controller_of(self, axis)
     }
 
+    fn frequency_response<'py>(
+        &self,
+        py: Python<'py>,
+        axis: &str,
+        control_loop: &str,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        design::frequency_response_of(py, self, axis, control_loop)
+    }
+
     fn __repr__(&self) -> String {
         format!("Machine({:?}, axes {})", self.config.name(), self.axes().join(", "))
     }

@@ -38,7 +38,8 @@ impl TuneOptions {
             "gpc" if self.contrast => Ok(TuningSearch::Contrast),
             "gpc" => Ok(TuningSearch::Gpc(self.designs)),
             "cascade" => Ok(TuningSearch::Cascade(self.seed)),
-            other => Err(value_error(format!("controller {other:?}: must be gpc or cascade"))),
+            "contour" => Ok(TuningSearch::ContourGain),
+            other => Err(value_error(format!("controller {other:?}: must be gpc, cascade or contour"))),
         }
     }
 

@@ -3,6 +3,7 @@
 //!
 //! - [`stress`] runs random trajectories and checks limits, friction, energy balance and following errors at every tick.
 //! - [`production_traces`] generates recordings of hidden axes in production.
+//! - [`presliding_study`] identifies the presliding of random axes.
 //! - [`fixtures`] contains test machines, recordings, tuning problems and temporary folders.
 //!
 //! The crate is a development dependency only and is not published.
@@ -26,5 +27,6 @@
 #![forbid(unsafe_code)]
 
 pub mod fixtures;
+pub mod presliding_study;
 pub mod production_traces;
 pub mod stress;

@@ -69,6 +69,10 @@ pub struct IdentifyArguments {
     /// Skip the refinement in closed loop; run only the steps of the paper.
     #[arg(long)]
     no_refine: bool,
+    /// Identify stiffness and damping of the presliding from slow reversals; the lag of the current is that of
+    /// --current-lag-ms, 0 by default.
+    #[arg(long)]
+    presliding: bool,
     /// Recording for validation of the identified axis; can be repeated.
     #[arg(long, value_name = "RECORDING")]
     validate: Vec<PathBuf>,
@@ -234,10 +238,15 @@ fn identify(
         (given, _) => given,
     };
     let other_modes = recordings::feedforward(for_others, others.len(), "--validate-feedforward")?;
-    let options = arguments.reading.options()?;
+    // A lag of the current cannot be told from presliding.
+    let reading = match arguments.presliding {
+        true => arguments.reading.clone().without_estimated_current_lag(),
+        false => arguments.reading.clone(),
+    };
+    let options = reading.options()?;
     let read = |path: &PathBuf, feedforward, option| {
         spinner.set_activity(format!("reading {}", path.display()))?;
-        let reading = (&arguments.reading, &options);
+        let reading = (&reading, &options);
         recordings::read(path, (axis, &periods), reading, (feedforward, option))
     };
     let recordings = files.iter().zip(modes).map(|(path, mode)| read(path, mode, "--feedforward"));
@@ -247,7 +256,8 @@ fn identify(
     let others: Vec<ConditionedRecording> = others.collect::<Result<_, _>>()?;
 
     let i0 = if arguments.free_i0 { Breakaway::Freed } else { Breakaway::Held };
-    let options = IdentificationOptions { i0, refine: refined_groups(arguments) };
+    let options =
+        IdentificationOptions { i0, refine: refined_groups(arguments), presliding: arguments.presliding };
     let start = |part: &str| spinner.set_activity(part);
     Ok(AxisIdentification::new((parameters, index), recordings, others, &options, start)?)
 }

@@ -5,7 +5,7 @@ use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_core::units::Rounded;
 use virtual_axes_identify::identify::summary::{
     DelaySummary, FrictionSummary, GravitySummary, IdentificationSummary, InertiaSummary, LawSummary,
-    PartSummary, RefinementSummary, ResidualSummary,
+    PartSummary, PreslidingSummary, RefinementSummary, ResidualSummary,
 };
 use virtual_axes_identify::identify::{
     FeedforwardRegression, FrictionLaw, GravityCurrent, GravitySource, IdentifiedValue, ResidualStatistics,
@@ -140,6 +140,7 @@ fn steps(found: &IdentificationSummary) -> Vec<String> {
     let lines = [
         found.gravity.as_ref().map(gravity),
         found.inertia.as_ref().map(inertia),
+        found.presliding.as_ref().map(presliding),
         found.feedforward.velocity.as_ref().map(|fit| regression("VFFW", fit)),
         found.feedforward.torque.as_ref().map(|fit| regression("TFFW", fit)),
     ];
@@ -262,6 +263,16 @@ fn gravity(gravity: &GravitySummary) -> String {
         ));
     }
     text
+}
+
+fn presliding(found: &PreslidingSummary) -> String {
+    let [low, high] = found.interval.map(|bound| digits(bound, 3));
+    format!(
+        "presliding: stiffness {} {} (95 % interval {low} … {high}) from {} reversals",
+        digits(found.stiffness, 4),
+        found.stiffness_unit,
+        found.reversals
+    )
 }
 
 fn inertia(inertia: &InertiaSummary) -> String {

@@ -12,7 +12,7 @@ use virtual_axes_io::files::{Columns, RecordingFormat, RecordingOptions, read_re
 use crate::campaign::FeedforwardName;
 
 /// Options for reading all recordings.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, clap::Args)]
 pub struct RecordingArguments {
     /// Column and unit of a channel in CSV files, for example `position=Pos1[mm]`, `current=#4[-1 A]`.
     /// Channels: time, psec, position, velocity, current, velocity_feedforward, torque_feedforward; also
@@ -66,6 +66,12 @@ impl RecordingArguments {
     /// Returns the file with column mappings, if given.
     pub fn map(&self) -> Option<&Path> {
         self.columns.as_deref()
+    }
+
+    /// Sets the lag of the current to 0 unless it is given, in place of an estimate.
+    pub fn without_estimated_current_lag(mut self) -> Self {
+        self.current_lag_ms = self.current_lag_ms.or(Some(0.0));
+        self
     }
 
     /// Returns the options for reading files.

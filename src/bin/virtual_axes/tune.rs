@@ -29,6 +29,8 @@ enum TunableController {
     Gpc,
     /// Kp and feedforward weights of the cascade.
     Cascade,
+    /// Gain of cross-coupled control, with the position controllers as they are.
+    Contour,
 }
 
 /// Arguments of `virtual_axes tune`.
@@ -107,7 +109,7 @@ pub fn run(arguments: &TuneArguments) -> Result<String, Box<dyn Error>> {
         return Err("--designs requires --controller gpc without --contrast".into());
     }
     if arguments.seed.is_some() && tunable != TunableController::Cascade {
-        return Err("--seed requires --controller cascade; the search for gpc has no seed".into());
+        return Err("--seed requires --controller cascade; the other searches have no seed".into());
     }
     if arguments.contrast && arguments.also.len() > 1 {
         return Err(format!("--contrast requires a single --also path, not {}", arguments.also.len()).into());
@@ -185,6 +187,7 @@ fn search(arguments: &TuneArguments, tunable: TunableController) -> TuningSearch
             TuningSearch::Gpc(arguments.designs.and_then(|designs| usize::try_from(designs).ok()))
         }
         TunableController::Cascade => TuningSearch::Cascade(arguments.seed()),
+        TunableController::Contour => TuningSearch::ContourGain,
     }
 }
 
@@ -261,7 +264,7 @@ fn record(
     let run = |tuning: &Tuning| -> Result<VariantRun, TuneError> {
         // Controller of the tuned axes.
         let controller = match tuning {
-            Tuning::Present => variant::controller_name(problem.parameters()),
+            Tuning::Present | Tuning::ContourGain(_) => variant::controller_name(problem.parameters()),
             Tuning::Gpc { .. } => "gpc".to_owned(),
             Tuning::Cascade(_) => "cascade".to_owned(),
         };

@@ -2,7 +2,7 @@
 
 use crate::config::{AxisConfig, AxisKind, MachineConfig, Periods};
 use crate::control::{CONTOUR_AXES, ContourVector, Rst, contour_error};
-use crate::design::{DesignError, check_stable};
+use crate::design::{DesignError, PredictionModel, check_stable};
 
 use super::bank::AxisBank;
 use super::{Axis, AxisError, AxisParameters, MachineError, design_controller, prediction_model};
@@ -82,12 +82,24 @@ fn require_stable_contour(axis: &AxisConfig, periods: &Periods, gain: f64) -> Re
         return Ok(());
     }
     let model = prediction_model(axis, periods)?;
-    let rst = design_controller(axis, &model)?;
+    let sum = design_contour_controller(axis, &model, gain)?;
+    check_stable(&model, &sum).map_err(|source| AxisError::ContourControl { gain, source })
+}
+
+/// Designs the controller that acts across a path perpendicular to `axis`: its position controller with the gain K of
+/// cross-coupled control, 1/s, in addition. T is that of a regulator; it has no part in stability and margins.
+///
+/// # Errors
+/// [`DesignError`] if the configuration does not give a controller.
+pub fn design_contour_controller(
+    axis: &AxisConfig,
+    model: &PredictionModel,
+    gain: f64,
+) -> Result<Rst, DesignError> {
+    let rst = design_controller(axis, model)?;
     let mut r = rst.r().to_vec();
     // The controller sees the sum as its output, so that K adds to r₀ in units of s₀.
     r[0] += gain * rst.s()[0];
-    // T has no part in the stability.
     let t = [r.iter().sum()];
-    let sum = Rst::new(&r, rst.s(), &t, 0).map_err(DesignError::from)?;
-    check_stable(&model, &sum).map_err(|source| AxisError::ContourControl { gain, source })
+    Ok(Rst::new(&r, rst.s(), &t, 0)?)
 }

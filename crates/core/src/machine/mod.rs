@@ -20,6 +20,7 @@ mod stored;
 pub use axis::{Axis, AxisParameters};
 pub use bank::SimdWidth;
 pub use closed_loop::closed_loop_response;
+pub use contour_control::design_contour_controller;
 pub use controller::{FALLBACK_DELAY, design_controller};
 pub use loop_responses::{NaturalFrequencies, loop_response, natural_frequencies};
 pub use prediction::{deviating_plant_model, prediction_model};

@@ -6,6 +6,7 @@ use super::feedforward_mode::FeedforwardMode;
 use super::friction::FrictionFit;
 use super::gravity::{GravityFit, SteadyMeasurements};
 use super::inertia::InertiaFit;
+use super::presliding::PreslidingFit;
 use super::refine::Refinement;
 use super::validate::Agreement;
 use crate::recording::Finding;
@@ -31,6 +32,11 @@ pub struct Identification {
     /// If it agrees with the inertia by eq. 5 from the recordings, but both differ from the identified
     /// inertia, the current varies between the samples.
     pub replayed_inertia: Option<f64>,
+    /// Presliding of the friction, from reversals.
+    pub presliding: Option<PreslidingFit>,
+    /// Stiffness σ0 of the presliding at the axis, N/m or N·m/rad, below which the recordings exclude it; none if the
+    /// presliding was identified or not searched for.
+    pub excluded_presliding: Option<f64>,
     /// VFFW and TFFW by regression.
     pub feedforward: FeedforwardFit,
     /// Identified delays α, β, γ.

@@ -20,6 +20,8 @@ pub struct IdentificationOptions {
     pub i0: Breakaway,
     /// Parameters of the closed-loop refinement.
     pub refine: RefinementScope,
+    /// True if the presliding is identified from reversals.
+    pub presliding: bool,
 }
 
 /// Parameters that the closed-loop refinement changes; the others keep the result of the steps.
@@ -48,6 +50,6 @@ impl RefinementScope {
 
 impl Default for IdentificationOptions {
     fn default() -> Self {
-        IdentificationOptions { i0: Breakaway::Held, refine: RefinementScope::ALL }
+        IdentificationOptions { i0: Breakaway::Held, refine: RefinementScope::ALL, presliding: false }
     }
 }

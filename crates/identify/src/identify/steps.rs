@@ -11,6 +11,7 @@ use super::gravity::{GravityCurrent, SteadyMeasurements, fit_gravity};
 use super::identification::Identification;
 use super::inertia::fit_inertia;
 use super::options::{IdentificationInput, IdentificationOptions};
+use super::presliding::fit_presliding;
 use super::production::{are_production_traces, identify_production};
 use super::refine::RefinedParameter;
 use super::sanity::report_invalid;
@@ -33,9 +34,14 @@ pub fn identify(
         steps.find_production_experiments();
     } else {
         steps.fit_plant();
+        // The closed loop needs an approximate presliding only, and the presliding the inertia of the closed loop.
+        steps.fit_presliding(&mut Vec::new());
         steps.fit_feedforward_weights();
         steps.fit_closed_loop();
     }
+    let mut findings = Vec::new();
+    steps.fit_presliding(&mut findings);
+    steps.found.findings.append(&mut findings);
     steps.finish()
 }
 
@@ -81,6 +87,8 @@ impl<'a> IdentificationSteps<'a> {
                 gravity: None,
                 friction: None,
                 inertia: None,
+                presliding: None,
+                excluded_presliding: None,
                 replayed_inertia: None,
                 feedforward: FeedforwardFit::default(),
                 delays: Vec::new(),
@@ -145,6 +153,24 @@ impl<'a> IdentificationSteps<'a> {
         }
         if let Some(inertia) = &found.inertia {
             axis.motor.inertia = inertia.value;
+        }
+    }
+
+    /// Fits the presliding if the options ask for it.
+    fn fit_presliding(&mut self, findings: &mut Vec<Finding>) {
+        if !self.options.presliding {
+            return;
+        }
+        let recordings: Vec<&Signals> = self.inputs.iter().map(|input| input.signals).collect();
+        let found = &mut self.found;
+        found.axis.presliding = found.initial.presliding;
+        (found.presliding, found.excluded_presliding) =
+            match fit_presliding(&recordings, &found.axis, findings) {
+                Ok(fit) => (Some(fit), None),
+                Err(excluded) => (None, excluded),
+            };
+        if let Some(presliding) = &found.presliding {
+            presliding.apply(&mut found.axis);
         }
     }
 

@@ -8,7 +8,7 @@ use super::gravity::{GravityCurrent, GravitySource};
 use super::identification::Identification;
 use super::refine::{RefinedParameter, RefinedValue};
 use virtual_axes_core::config::{Assignment, ConfigError, Parameters, Value, ValueSource};
-use virtual_axes_core::units::{DEGREE, MILLISECOND, MILLISECOND_NS, POSITION_GAIN};
+use virtual_axes_core::units::{DEGREE, MILLISECOND, MILLISECOND_NS, NEWTON_PER_MICROMETER, POSITION_GAIN};
 
 /// Digits of a value beyond the first digit of its standard error.
 const GUARD_DIGITS: i32 = 2;
@@ -119,6 +119,7 @@ impl Identification {
             put(&["motor.inertia_kg_m2", "motor.mass_kg"], axis.motor.inertia, error, None, source);
         }
         self.push_friction(put);
+        self.push_presliding(put);
         self.push_gravity(put);
     }
 
@@ -160,6 +161,21 @@ impl Identification {
             None => ("i0 = a + c, assumed", self.error_of_sum().or(fit.map(|fit| fit.error_at(0.0)))),
         };
         put(&["friction.i0"], law.i0, error, None, source.to_owned());
+    }
+
+    fn push_presliding(&self, put: &mut ValueSink<'_>) {
+        let Some(fit) = &self.presliding else { return };
+        let source = format!("{} reversals", fit.reversals);
+        for (key, unit) in [
+            ("friction.presliding_stiffness_n_um", NEWTON_PER_MICROMETER),
+            ("friction.presliding_stiffness_nm_rad", 1.0),
+        ] {
+            put(&[key], fit.stiffness / unit, Some(fit.error() / unit), None, source.clone());
+        }
+        if let Some((value, error)) = fit.damping {
+            let keys = ["friction.presliding_damping_n_s_m", "friction.presliding_damping_nm_s_rad"];
+            put(&keys, value, Some(error), None, source);
+        }
     }
 
     /// Returns the standard error of a + c from the refinement.

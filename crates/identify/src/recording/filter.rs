@@ -95,6 +95,26 @@ impl GaussianFilter {
         out
     }
 
+    /// Returns the second derivative of `signal` at `index`; none closer to an end than the half length of the kernel.
+    pub(crate) fn second_at(&self, signal: &[f64], index: usize) -> Option<f64> {
+        self.bend_at(&self.second, signal, index)
+    }
+
+    /// Returns the smoothed value of `signal` at `index`; none closer to an end than the half length of the kernel.
+    pub(crate) fn value_at(&self, signal: &[f64], index: usize) -> Option<f64> {
+        Some(signal.get(index)? + self.bend_at(&self.value, signal, index)?)
+    }
+
+    /// Returns the weighted sum of x(n−k) + x(n+k) − 2 x(n).
+    fn bend_at(&self, weights: &[f64], signal: &[f64], index: usize) -> Option<f64> {
+        let radius = self.radius();
+        let middle = *signal.get(index)?;
+        let part = signal.get(index.checked_sub(radius)?..=index + radius)?;
+        let (before, after) = (part[..radius].iter().rev(), part[radius + 1..].iter());
+        let bends = before.zip(after).zip(weights);
+        Some(bends.map(|((a, b), weight)| weight * ((a - middle) + (b - middle))).sum::<f64>())
+    }
+
     fn extended(&self, signal: &[f64]) -> Vec<f64> {
         let (Some(&first), Some(&last)) = (signal.first(), signal.last()) else {
             return vec![0.0; 2 * self.radius()];

@@ -23,6 +23,9 @@ pub enum TuneError {
     /// Path without motion of any axis.
     #[error("no axis moves: there is nothing to tune")]
     NothingMoves,
+    /// Less than two linear axes move.
+    #[error("contour_control.gain has no effect: less than two linear axes move on the path")]
+    NoContour,
     /// No design within the margin limits.
     #[error(
         "none of {designs} designs has a modulus margin of {} and a delay margin of {} ms on its worst axis; \

@@ -2,11 +2,12 @@
 //!
 //! A [`TuningProblem`] combines a machine, a [`Workload`] and a [`Cost`]; it simulates tunings and returns
 //! their cost and the stability margins of the worst axis. [`tune_gpc`] searches tunings of a predictive
-//! controller, [`tune_cascade`] gains of the cascade. Both accept only tunings within the [`MarginLimits`]
+//! controller, [`tune_cascade`] gains of the cascade, [`tune_contour_gain`] the gain of cross-coupled control. They accept only tunings within the [`MarginLimits`]
 //! that never saturate. Simulations run in parallel on all cores; the result does not depend on the number of
 //! cores.
 
 mod cascade;
+mod contour_gain;
 mod contrast;
 mod cost;
 mod error;
@@ -21,6 +22,7 @@ mod tuning;
 mod workload;
 
 pub use cascade::tune_cascade;
+pub use contour_gain::tune_contour_gain;
 pub use contrast::{Contrast, find_contrasts};
 pub use cost::{Cost, CostError, CostTerm};
 pub use error::TuneError;

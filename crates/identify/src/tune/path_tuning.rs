@@ -2,7 +2,7 @@
 
 use super::{
     Contrast, MarginLimits, SearchResult, TuneError, Tuning, TuningCandidate, TuningProblem, Workload,
-    find_contrasts, fine_design_grid, tune_cascade, tune_gpc, tune_gpc_from,
+    find_contrasts, fine_design_grid, tune_cascade, tune_contour_gain, tune_gpc, tune_gpc_from,
 };
 
 /// Search for a tuning.
@@ -12,6 +12,8 @@ pub enum TuningSearch {
     Gpc(Option<usize>),
     /// Kp and feedforward weights of the cascade, with the seed of the starting points.
     Cascade(u64),
+    /// Gain of cross-coupled control; the position controllers keep their tuning.
+    ContourGain,
     /// Predictive controllers that are better than the initial tuning on the path and worse on the other path.
     Contrast,
 }
@@ -60,6 +62,7 @@ impl TuningResult {
             }
             (TuningSearch::Gpc(None), _) => tune_gpc(problem, limits)?,
             (TuningSearch::Cascade(seed), _) => tune_cascade(problem, limits, seed)?,
+            (TuningSearch::ContourGain, _) => tune_contour_gain(problem, limits)?,
         };
         let elsewhere = paths.iter().map(|path| {
             Ok(ComparedPath {

@@ -8,10 +8,12 @@ use super::margin_limits::{MarginLimits, worst_margins};
 use super::progress::Progress;
 use super::tuning::Tuning;
 use super::workload::Workload;
-use virtual_axes_core::config::{AxisConfig, MachineConfig, Parameters};
-use virtual_axes_core::control::Rst;
+use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig, Parameters};
+use virtual_axes_core::control::{CONTOUR_AXES, Rst};
 use virtual_axes_core::design::{DesignError, Margins, PredictionModel, gpc};
-use virtual_axes_core::machine::{MachineError, design_controller, prediction_model};
+use virtual_axes_core::machine::{
+    MachineError, design_contour_controller, design_controller, prediction_model,
+};
 use virtual_axes_core::trial::{Figures, TrialError, TrialOutcome};
 use virtual_axes_core::units::POSITION_GAIN;
 
@@ -58,6 +60,8 @@ pub struct TuningProblem<'a> {
     joints: Vec<String>,
     /// Prediction models of the moving axes.
     models: Vec<PredictionModel>,
+    /// Axes of cross-coupled control, the linear ones, with their prediction models.
+    contour_axes: Vec<(AxisConfig, PredictionModel)>,
     present: TuningCandidate,
 }
 
@@ -86,12 +90,26 @@ impl<'a> TuningProblem<'a> {
                 .map_err(|source| MachineError::Axis { axis: axis.name().to_owned(), source })
         };
         let models = axes.iter().map(model).collect::<Result<Vec<_>, _>>()?;
+        let linear = config.axes().iter().filter(|axis| axis.kind() == AxisKind::Linear).take(CONTOUR_AXES);
+        let contour_axes: Vec<_> =
+            linear.map(|axis| Ok((axis.clone(), model(&axis)?))).collect::<Result<_, MachineError>>()?;
         let margins = worst_margins(
             models.iter().zip(&axes).map(|(model, axis)| (model, design_controller(axis, model))),
         );
         let joints = axes.iter().map(|axis| axis.name().to_owned()).collect();
         let present = candidate(Tuning::Present, margins, figures, cost, &config);
-        Ok(TuningProblem { parameters, workload, cost, progress, config, moving, joints, models, present })
+        Ok(TuningProblem {
+            parameters,
+            workload,
+            cost,
+            progress,
+            config,
+            moving,
+            joints,
+            models,
+            contour_axes,
+            present,
+        })
     }
 
     /// Returns the present tuning of the machine.
@@ -137,6 +155,14 @@ impl<'a> TuningProblem<'a> {
     pub fn margins(&self, tuning: &Tuning) -> Option<Margins> {
         match tuning {
             Tuning::Present => self.present.margins,
+            Tuning::ContourGain(gain) => {
+                let axes = || self.axes().zip(&self.models);
+                let along = axes().map(|(axis, model)| (model, design_controller(axis, model)));
+                let across = self.contour_axes.iter().map(|(axis, model)| {
+                    (model, design_contour_controller(axis, model, gain * POSITION_GAIN))
+                });
+                worst_margins(along.chain(across))
+            }
             Tuning::Gpc { .. } => {
                 let design = tuning.gpc()?;
                 worst_margins(self.models.iter().map(|model| (model, gpc(model, &design))))

@@ -5,6 +5,9 @@ use std::fmt;
 use virtual_axes_core::config::{Assignment, ConfigError, Parameters, Value, ValueSource};
 use virtual_axes_core::design::{ControlWeight, GpcTuning};
 
+/// Key of the gain of cross-coupled control.
+pub(super) const CONTOUR_GAIN: &str = "contour_control.gain";
+
 /// Gains of the cascade on one axis, in units of a machine file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxisGains {
@@ -34,6 +37,8 @@ pub enum Tuning {
     },
     /// Gains of the cascade per joint.
     Cascade(Vec<(String, AxisGains)>),
+    /// Gain of cross-coupled control, (m/min)/mm; the position controllers keep their tuning.
+    ContourGain(f64),
 }
 
 impl Tuning {
@@ -67,6 +72,7 @@ impl Tuning {
                 };
                 joints.iter().flat_map(of_joint).collect()
             }
+            Tuning::ContourGain(gain) => vec![(CONTOUR_GAIN.to_owned(), Value::Double(*gain))],
             Tuning::Cascade(axes) => axes
                 .iter()
                 .flat_map(|(joint, gains)| {
@@ -111,6 +117,7 @@ impl fmt::Display for Tuning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Tuning::Present => f.write_str("present"),
+            Tuning::ContourGain(gain) => write!(f, "{CONTOUR_GAIN} {gain}"),
             Tuning::Gpc { n1, n2, nu, lambda_rel } => {
                 write!(f, "N1 {n1}, N2 {n2}, Nu {nu}, λ_rel {lambda_rel}")
             }

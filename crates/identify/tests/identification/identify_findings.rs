@@ -71,7 +71,7 @@ fn identified(raw: &[RawRecording], start: &Parameters, options: &Identification
 }
 
 const STEPS_ONLY: IdentificationOptions =
-    IdentificationOptions { i0: Breakaway::Held, refine: RefinementScope::NONE };
+    IdentificationOptions { i0: Breakaway::Held, refine: RefinementScope::NONE, presliding: false };
 
 /// Returns text and remedy of the only finding with this code.
 fn finding(found: &Identification, severity: Severity, code: &str) -> String {
@@ -242,7 +242,8 @@ fn a_breakaway_above_the_law_is_identified_as_separate_parameter() {
     let sticky = with(true_parameters(), "x.friction.i0", Value::Double(1.4));
     let psec = legs(&[0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 12.0], true);
     let raw = recorded(&sticky, &psec, &Disturbance::usual(virtual_axes_core::config::AxisKind::Linear, 5));
-    let options = IdentificationOptions { i0: Breakaway::Freed, refine: RefinementScope::ALL };
+    let options =
+        IdentificationOptions { i0: Breakaway::Freed, refine: RefinementScope::ALL, presliding: false };
     let found = identified(&[raw], &initial_parameters("x"), &options);
     let i0 = RefinedParameter::Breakaway.get(found.axis());
     println!("i0 {i0:.4} A");
@@ -319,7 +320,7 @@ fn only_selected_parameters_are_refined() {
     let found = identified(
         &[raw],
         &initial_parameters("x"),
-        &IdentificationOptions { i0: Breakaway::Held, refine: chosen },
+        &IdentificationOptions { i0: Breakaway::Held, refine: chosen, presliding: false },
     );
     let refinement = found.refinement.as_ref().expect("a refinement");
     let moved: Vec<RefinedParameter> =

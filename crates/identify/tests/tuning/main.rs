@@ -1,5 +1,6 @@
 //! Tests of tuning and of iterative learning.
 
+mod contour_gain;
 mod learn;
 mod tune;
 mod tune_robustness;

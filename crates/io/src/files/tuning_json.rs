@@ -50,6 +50,7 @@ fn candidate(candidate: &TuningCandidate, machine: &MachineConfig) -> Map<String
 fn tuning(tuning: &Tuning) -> Value {
     match tuning {
         Tuning::Present => json!("present"),
+        Tuning::ContourGain(gain) => json!({ "contour_gain": gain }),
         Tuning::Gpc { n1, n2, nu, lambda_rel } => {
             json!({ "n1": n1, "n2": n2, "nu": nu, "lambda_rel": lambda_rel })
         }
@@ -89,7 +90,14 @@ pub fn tuning_json(
     add("input", json!(input.0));
     add("description", json!(input.1));
     add("machine", json!(problem.config().name()));
-    add("controller", json!(if matches!(search, TuningSearch::Cascade(_)) { "cascade" } else { "gpc" }));
+    add(
+        "controller",
+        json!(match search {
+            TuningSearch::Cascade(_) => "cascade",
+            TuningSearch::ContourGain => "contour",
+            TuningSearch::Gpc(_) | TuningSearch::Contrast => "gpc",
+        }),
+    );
     add("tuned_axes", json!(problem.joints()));
     let terms = problem.cost().terms().iter().map(|(term, weight)| (term.name().to_owned(), json!(weight)));
     add("cost", Value::Object(terms.collect()));

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from ._native import PredictionModel, Rst
 from .arguments import to_native, to_whole
@@ -18,11 +18,15 @@ from .machine import Machine
 
 if TYPE_CHECKING:
     import control
+    import numpy as np
+    from numpy.typing import NDArray
 
 __all__ = [
+    "FrequencyResponse",
     "Margins",
     "PredictionModel",
     "Rst",
+    "frequency_response",
     "from_control",
     "gpc",
     "loop_transfer",
@@ -51,6 +55,33 @@ class Margins:
     """Gain margin downwards, a factor below 1; 0 if there is none."""
     delay: float
     """Delay margin, s; infinite without crossover."""
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """Frequency response of a control loop, open and closed, as `virtual_axes bode --csv` writes it."""
+
+    frequency_hz: NDArray[np.float64]
+    """Frequencies up to the Nyquist frequency of the loop, Hz."""
+    open_db: NDArray[np.float64]
+    """Magnitude of the open loop, dB."""
+    open_deg: NDArray[np.float64]
+    """Phase of the open loop without jumps, °."""
+    closed_db: NDArray[np.float64]
+    """Magnitude of the closed loop from setpoint to actual value, dB."""
+    closed_deg: NDArray[np.float64]
+    """Phase of the closed loop without jumps, °."""
+
+
+def frequency_response(
+    machine: Machine, axis: str, control_loop: Literal["current", "velocity", "position"] = "position"
+) -> FrequencyResponse:
+    """Computes the frequency response of a control loop of an axis, as `virtual_axes bode` does.
+
+    The plant has its deviation; friction, limits, feedforward and delays are left out. Raises `ValueError` for an unknown
+    axis or loop, and for the position loop over unstable inner loops.
+    """
+    return FrequencyResponse(**to_native(machine).frequency_response(axis, control_loop))
 
 
 def model(machine: Machine, axis: str) -> PredictionModel:

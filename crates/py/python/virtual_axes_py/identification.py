@@ -81,6 +81,7 @@ def identify(
     validate_feedforward: Feedforward | Sequence[Feedforward] = (),
     refine: Sequence[str] | None = None,
     free_i0: bool = False,
+    presliding: bool = False,
     column: Sequence[str] = (),
     columns: str | os.PathLike[str] | None = None,
     topic: Sequence[str] = (),
@@ -102,7 +103,8 @@ def identify(
     The options are those of the command: `validate` are recordings to compare with the result; `feedforward` is the
     active one, `off`, `velocity` or `both`, for all or for each recording; `refine` are the groups that the refinement
     in closed loop adjusts (`inertia`, `friction`, `gravity`, `feedforward`, `gain`; by default all, `()` for none);
-    `free_i0` refines the breakaway current by itself; `column`, `columns`, `topic`, `joint`, `format` and `rate_hz`
+    `free_i0` refines the breakaway current by itself; `presliding` identifies stiffness and damping of the presliding from
+    slow reversals, with the lag of the current `current_lag_ms`, 0 by default; `column`, `columns`, `topic`, `joint`, `format` and `rate_hz`
     read the files; `cutoff_hz`, `current_lag_ms`, `trace_filter_hz` and `psec_shift` (ms, or `auto`) condition the
     signals.
 
@@ -126,6 +128,7 @@ def identify(
         ),
         "refine": None if refine is None else list(refine),
         "free_i0": free_i0,
+        "presliding": presliding,
     }
     native = to_native(machine if machine is not None else Machine.load())
     return Identification(_native.identify(native, axis, _sources(recordings), _sources(validate), options))

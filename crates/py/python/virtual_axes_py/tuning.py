@@ -48,7 +48,7 @@ def tune(
     machine: Machine,
     psec: Setpoints,
     *,
-    controller: Literal["gpc", "cascade"] | None = None,
+    controller: Literal["gpc", "cascade", "contour"] | None = None,
     cost: str = "contour",
     modulus_margin: float | None = None,
     delay_margin_ms: float | None = None,
@@ -60,7 +60,8 @@ def tune(
     """Searches the tuning of the position controllers with the least cost on a path, as `virtual_axes tune` does.
 
     `psec` is the path, as for `Machine.simulate`; its axes that move are tuned. `controller` is `gpc` (N1, N2, Nu, λ)
-    or `cascade` (Kp and feedforward weights), by default that of the machine. `cost` is a weighted sum such as
+    or `cascade` (Kp and feedforward weights), by default that of the machine, or `contour` (the gain of cross-coupled
+    control, with the position controllers as they are). `cost` is a weighted sum such as
     `contour=1,activity=0.1` of `contour`, `contour-rms`, `following`, `rms`, `current`, `activity`. Tunings keep
     `modulus_margin` (default 0.5) and `delay_margin_ms` (default 5) on all axes and reach no limit. `seed` (default 1)
     is for the cascade, `designs` the least number of predictive controllers in the first grid. The best tuning is
@@ -78,7 +79,7 @@ def tune(
     if designs is not None and not 1 <= designs <= 1_000_000:
         raise ValueError(f"designs {designs}: must be in 1 … 1000000")
     if seed is not None and chosen != "cascade":
-        raise ValueError("seed requires controller cascade; the search for gpc has no seed")
+        raise ValueError("seed requires controller cascade; the other searches have no seed")
     if seed is not None and seed < 0:
         raise ValueError(f"seed {seed}: must be at least 0")
     options = {

@@ -8,6 +8,7 @@ mod friction;
 mod gravity;
 mod inertia;
 mod notices;
+mod presliding;
 mod recordings;
 mod refinement;
 mod summary;
@@ -59,11 +60,14 @@ impl IdentificationPage<'_> {
             gravity::section(self),
             friction::section(self),
             inertia::section(self),
+        ];
+        sections.extend(presliding::section(self));
+        sections.extend([
             feedforward::section(self),
             delays::section(self),
             refinement::section(self),
             agreement::section(self),
-        ];
+        ]);
         let validations = self.validations.iter().zip(&self.summary.validation);
         sections.extend(
             validations

@@ -10,6 +10,7 @@ pub(super) enum Step {
     Gravity,
     Friction,
     Inertia,
+    Presliding,
     Feedforward,
     Delays,
     Refinement,
@@ -25,6 +26,7 @@ impl Step {
             "few-speeds" | "one-direction" | "asymmetric-friction" | "poor-friction-law" | "no-breakaway" => {
                 &[Step::Friction]
             }
+            "presliding-damping" => &[Step::Presliding],
             "saturated-current" | "no-acceleration" | "negative-inertia" | "unseen-current" => {
                 &[Step::Inertia]
             }

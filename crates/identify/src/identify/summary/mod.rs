@@ -18,7 +18,8 @@ use super::values::IdentifiedValue;
 use crate::recording::Finding;
 pub use steps::{
     Change, DelaySummary, DirectionsSummary, Estimate, FrictionSummary, GravitySummary, InertiaSummary,
-    LawCoefficients, LawSummary, LevelSummary, LineSummary, RefinementSummary, RestSummary, SpeedSummary,
+    LawCoefficients, LawSummary, LevelSummary, LineSummary, PreslidingSummary, RefinementSummary,
+    RestSummary, SpeedSummary,
 };
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::units::{DEGREE, MILLIMETER, MILLISECOND};
@@ -47,6 +48,8 @@ pub struct IdentificationSummary {
     pub friction: Option<FrictionSummary>,
     /// Inertia by Prévost eq. 5 and by the refinement.
     pub inertia: Option<InertiaSummary>,
+    /// Presliding; none if it was not identified.
+    pub presliding: Option<PreslidingSummary>,
     /// Gravity.
     pub gravity: Option<GravitySummary>,
     /// Regressions of the feedforward weights.
@@ -103,6 +106,7 @@ impl IdentificationSummary {
                 .as_ref()
                 .map(|friction| FrictionSummary::new(friction, &found.steady.levels, speed_unit(axis))),
             inertia: InertiaSummary::new(found),
+            presliding: found.presliding.as_ref().map(|fit| PreslidingSummary::new(fit, kind)),
             gravity: found.gravity.as_ref().map(GravitySummary::new),
             feedforward: found.feedforward.clone(),
             delays: found.delays.iter().map(|fit| DelaySummary::new(fit, position)).collect(),

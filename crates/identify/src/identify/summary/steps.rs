@@ -7,8 +7,10 @@ use super::super::feedforward_mode::FeedforwardMode;
 use super::super::friction::{FrictionFit, FrictionLaw, LawFit};
 use super::super::gravity::{GravityCurrent, GravityFit, GravitySource, SAME_SPEED, SteadyCurrent};
 use super::super::identification::Identification;
+use super::super::presliding::PreslidingFit;
 use super::super::refine::{RefinedParameter, RefinedValue, Refinement};
-use virtual_axes_core::units::{DEGREE, MILLISECOND_NS, Nanoseconds};
+use virtual_axes_core::config::AxisKind;
+use virtual_axes_core::units::{DEGREE, MILLISECOND_NS, NEWTON_PER_MICROMETER, Nanoseconds};
 
 /// Coefficients of Prévost eq. 3, or their standard errors; a and c in A, b and d in min/m or min/rev.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -206,6 +208,43 @@ impl InertiaSummary {
             refined: refined.map(|refined| refined.value),
             refined_error: refined.map(|refined| refined.error),
         })
+    }
+}
+
+/// Presliding of the friction.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PreslidingSummary {
+    /// Stiffness σ0 at the axis, N/µm or N·m/rad.
+    pub stiffness: f64,
+    /// Unit of the stiffness.
+    pub stiffness_unit: &'static str,
+    /// Bounds of the 95 % interval of the stiffness.
+    pub interval: [f64; 2],
+    /// Damping σ1 at the axis, N·s/m or N·m·s/rad; none if the recordings do not determine it.
+    pub damping: Option<Estimate>,
+    /// Friction over stiffness, µm or mdeg.
+    pub length: f64,
+    /// Number of reversals.
+    pub reversals: usize,
+    /// Distance since a reversal, µm or mdeg, measured and modeled friction current, A, of one reversal.
+    pub curve: Vec<[f64; 3]>,
+}
+
+impl PreslidingSummary {
+    pub(super) fn new(fit: &PreslidingFit, kind: AxisKind) -> Self {
+        let (unit, stiffness_unit, length) = match kind {
+            AxisKind::Linear => (NEWTON_PER_MICROMETER, "N/um", 1e-6),
+            AxisKind::Rotary => (1.0, "N.m/rad", 1e-3 * DEGREE),
+        };
+        PreslidingSummary {
+            stiffness: fit.stiffness / unit,
+            stiffness_unit,
+            interval: fit.interval.map(|bound| bound / unit),
+            damping: fit.damping.map(|(value, error)| Estimate { value, error }),
+            length: fit.length / length,
+            reversals: fit.reversals,
+            curve: fit.curve.iter().map(|&[x, i, model]| [x / length, i, model]).collect(),
+        }
     }
 }
 
