@@ -4,16 +4,17 @@
     pip install scipy==1.17.1
     python tools/golden_backlash.py
 
-Nothing here is taken from the library. The equations are those of two masses with a spring and a damper in series with a
-gap (Nordin, Galic and Gutman, 1997), on a structure with a mass, a spring and a damper, in Newton's form. Between two
-events they are linear: matrix exponentials over a hundredth of a tick, with the instant of an event found by Brent's
-method to 1e-16 s. Inputs are constant over a tick: a voltage and a torque at the load, both sines of the tick. No friction.
+Nothing here is taken from the library. The equations are those of two masses with a spring and a damper in series
+with a gap (Nordin, Galic and Gutman, 1997), on a structure with a mass, a spring and a damper, in Newton's form.
+Between two events they are linear: matrix exponentials over a hundredth of a tick, with the instant of an event
+found by Brent's method to 1e-16 s. Inputs are constant over a tick: a voltage and a torque at the load, both sines
+of the tick. No friction.
 
-Columns of the cases: inductance (H), resistance (ohm), torque constant (N m/A), back-EMF constant (V s), inertia of the
-motor alone, stiffness (N m/rad), damping, inertia of the load, width of the gap (rad), modal inertia, frequency (rad/s) and
-damping ratio of the structure (0: none), 1 for a direct drive, amplitude of the voltage (V), amplitude of the torque (N m),
-its mean. Columns of the states: case, tick, i, omega, wind-up and load speed against the environment, theta, number of
-events so far.
+Columns of the cases: inductance (H), resistance (ohm), torque constant (N m/A), back-EMF constant (V s), inertia of
+the motor alone, stiffness (N m/rad), damping, inertia of the load, width of the gap (rad), modal inertia, frequency
+(rad/s) and damping ratio of the structure (0: none), 1 for a direct drive, amplitude of the voltage (V), amplitude
+of the torque (N m), its mean. Columns of the states: case, tick, i, omega, wind-up and load speed against the
+environment, theta, number of events so far.
 """
 
 import math
@@ -58,7 +59,7 @@ def system(case, side, voltage, torque):
     matrix[CURRENT, ONE] = voltage / inductance
     structure = np.zeros(9)
     if modal:
-        structure[DISPLACEMENT] = -frequency**2
+        structure[DISPLACEMENT] = -(frequency**2)
         structure[VELOCITY] = -2.0 * ratio * frequency
         structure -= (force if direct else spring) / modal
         matrix[DISPLACEMENT, VELOCITY] = 1.0
@@ -126,13 +127,17 @@ def solve(case):
 
 def main():
     """Writes the tables."""
-    columns = "inductance,resistance,torque_constant,emf_constant,inertia,stiffness,damping,load,gap,modal,frequency,ratio"
+    columns = (
+        "inductance,resistance,torque_constant,emf_constant,inertia,stiffness,damping,load,gap,modal,frequency,ratio"
+    )
     cases = [columns + ",direct,voltage,torque,mean_torque"]
     rows = ["case,tick,current,speed,wind_up,load_speed,angle,events"]
     for number, case in enumerate(CASES):
         cases.append(",".join(repr(float(value)) for value in case))
         for tick, *values in solve(case):
-            rows.append(f"{number},{tick}," + ",".join(f"{float(value):.15e}" for value in values[:-1]) + f",{values[-1]}")
+            rows.append(
+                f"{number},{tick}," + ",".join(f"{float(value):.15e}" for value in values[:-1]) + f",{values[-1]}"
+            )
         print(rows[-1])
     (GOLDEN / "backlash_cases.csv").write_text("\n".join(cases) + "\n")
     (GOLDEN / "backlash.csv").write_text("\n".join(rows) + "\n")

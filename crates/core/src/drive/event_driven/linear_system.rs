@@ -80,7 +80,7 @@ pub(super) struct Mode {
 }
 
 impl Mode {
-    /// All modes, in the order of [`index`](Self::index).
+    /// Returns all modes, in the order of [`index`](Self::index).
     pub fn all() -> [Self; 8] {
         std::array::from_fn(|index| Mode {
             is_in_contact: index & 4 != 0,
