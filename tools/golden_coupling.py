@@ -4,8 +4,8 @@
     pip install mujoco==4.0.0
     python tools/golden_coupling.py
 
-Nothing here is taken from the library: MuJoCo gets the bodies and their joints, A about -X through its pivot and C about
--Z through its own, and computes mass matrices, gravity, velocity torques and motion. workpieces.csv has random
+Nothing here is taken from the library: MuJoCo gets the bodies and their joints, A about -X through its pivot and C
+about -Z through its own, and computes mass matrices, gravity, velocity torques and motion. workpieces.csv has random
 workpieces in random states; workpiece_motion.csv has a motion after torques of 48 ms at both joints, by the classical
 Runge-Kutta method with small steps. Lengths in m, angles in rad, torques in N m.
 """

@@ -1,7 +1,7 @@
 //! Rigid-body dynamics of a workpiece on a tilting table A that carries a rotary table C.
 //!
-//! Lagrange's equations of the two joints (Siciliano, Sciavicco, Villani and Oriolo, *Robotics: Modelling, Planning and
-//! Control*, 2009, section 7.1) for the kinematic chain of [`kinematics`](crate::kinematics). With ρ = Rz(−c) (W + p − Pc),
+//! Lagrange's equations of the two joints (Spong, Hutchinson and Vidyasagar, *Robot Modeling and Control*, 2006,
+//! chapter 7) for the kinematic chain of [`kinematics`](crate::kinematics). With ρ = Rz(−c) (W + p − Pc),
 //! the center of mass p seen from the axis of C, y = Pc_y − Pa_y + ρ_y and h = W_z + p_z − Pa_z, its coordinates from the
 //! axis of A, the torques of the joints towards plus are:
 //!

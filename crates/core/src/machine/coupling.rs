@@ -9,7 +9,7 @@ use crate::drive::{Plant, WorkpieceDynamics};
 use crate::kinematics::{AxisRole, Kinematics};
 use crate::units::seconds;
 
-/// Largest number of runs of a tick. Two or three are usual; more are needed while friction begins or ceases to hold.
+/// Largest number of runs of a tick. Three or four are usual; more are needed while friction begins or ceases to hold.
 pub(super) const MAX_RUNS: usize = 12;
 /// Difference of forces that is neglected, in units of the force and the largest force of the motor.
 const TOLERANCE: f64 = 1e-11;

@@ -9,7 +9,7 @@ use virtual_axes_core::trajectory::{
     MotionId, Start, Trajectory, TrajectoryPoint, TrajectoryRequest, ValidationContext,
 };
 use virtual_axes_core::units::{Nanoseconds, seconds};
-use virtual_axes_verification::fixtures::machines::configured;
+use virtual_axes_verification::fixtures::machines::{configured, configured_with};
 
 const A: MotionId = MotionId(1);
 /// Cycles in which buffers can grow: 1.5 s, longer than the longest buffer, that of the contour error.
@@ -162,4 +162,16 @@ fn predictive_control_allocates_nothing() {
     let circle = fixture.ballbar(Start::Now);
     fixture.simulation.submit(A, circle).expect("accepted");
     assert_nothing_allocated("predictive", &mut fixture.simulation, |_| ());
+}
+
+#[test]
+fn coupled_axes_allocate_nothing() {
+    let workpiece = ["workpiece.mass_kg=400", "workpiece.center_of_mass_x_mm=200"];
+    let config = configured_with("mikron_ucp710", &[], &workpiece);
+    let joints = joint_limits(&config, "");
+    let mut simulation = Simulation::new(&config, joints, 0).expect("can be simulated");
+    assert_nothing_allocated("coupled", &mut simulation, |simulation| {
+        simulation.set_load(3, 3000.0, 20 * TSP);
+        simulation.set_load(4, -2000.0, 20 * TSP);
+    });
 }
