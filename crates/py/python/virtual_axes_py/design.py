@@ -78,8 +78,8 @@ def frequency_response(
 ) -> FrequencyResponse:
     """Computes the frequency response of a control loop of an axis, as `virtual_axes bode` does.
 
-    The plant has its deviation; friction, limits, feedforward and delays are left out. Raises `ValueError` for an unknown
-    axis or loop, and for the position loop over unstable inner loops.
+    The plant has its deviation; friction, limits, feedforward and delays are left out. Raises `ValueError` for an
+    unknown axis or loop, and for the position loop over unstable inner loops.
     """
     return FrequencyResponse(**to_native(machine).frequency_response(axis, control_loop))
 
