@@ -1,6 +1,6 @@
 //! Study of the identified presliding over random axes and recordings.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::fmt;
 
 use virtual_axes_core::config::{AxisKind, MachineConfig, Parameters, ValueSource};
@@ -139,7 +139,7 @@ fn motion(random: &mut RandomSource, kind: AxisKind, tsp: f64) -> (String, Vec<f
     let is_sine = random.chance(0.5);
     let at = |t: f64| {
         let phase = TAU * t / period;
-        let wave = if is_sine { (1.0 - phase.cos()) / 2.0 } else { (0.98 * phase.cos()).acos() / 3.141_6 };
+        let wave = if is_sine { (1.0 - phase.cos()) / 2.0 } else { (0.98 * phase.cos()).acos() / PI };
         unit * size * wave
     };
     let rest = |t: f64| at((t - 1.0).clamp(0.0, rounds as f64 * period)) - at(0.0);

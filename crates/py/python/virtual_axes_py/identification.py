@@ -101,12 +101,12 @@ def identify(
     values.
 
     The options are those of the command: `validate` are recordings to compare with the result; `feedforward` is the
-    active one, `off`, `velocity` or `both`, for all or for each recording; `refine` are the groups that the
-    refinement in closed loop adjusts (`inertia`, `friction`, `gravity`, `feedforward`, `gain`; by default all, `()`
-    for none); `free_i0` refines the breakaway current by itself; `presliding` identifies stiffness and damping of the
-    presliding from slow reversals, with the lag of the current `current_lag_ms`, 0 by default; `column`, `columns`,
-    `topic`, `joint`, `format` and `rate_hz` read the files; `cutoff_hz`, `current_lag_ms`, `trace_filter_hz` and
-    `psec_shift` (ms, or `auto`) condition the signals.
+    active one, `off`, `velocity` or `both`, for all or for each recording; `refine` are the groups that the refinement
+    in closed loop adjusts (`inertia`, `friction`, `gravity`, `feedforward`, `gain`; by default all, `()` for none);
+    `free_i0` refines the breakaway current by itself; `presliding` identifies stiffness and damping of the presliding
+    from slow reversals, with the lag `current_lag_ms` of the current, 0 by default; `column`, `columns`, `topic`,
+    `joint`, `format` and `rate_hz` read the files; `cutoff_hz`, `current_lag_ms`, `trace_filter_hz` and `psec_shift`
+    (ms, or `auto`) condition the signals.
 
     Raises `ValueError` with the command's text for an unreadable or implausible recording, or if no parameter can be
     identified. Releases the global interpreter lock.
