@@ -69,7 +69,7 @@ fn every_live_key_accepts_both_ends_of_its_range() {
             assert_eq!(parameters, start);
         }
     }
-    // 38 on each of five axes, one of the machine, and four of the node.
+    // 40 on each of five axes, one of the machine, and four of the node.
     assert_eq!(live, 2 * (5 * 40 + 1 + 4));
 }
 
