@@ -258,13 +258,25 @@ PARAMETER_TYPES = {
 
 def test_parameter_descriptions(seen: tuple[Run, AxesClient], machine: Machine):
     """Text, unit, type, range, choices, and whether the parameter is read-only."""
-    for descriptor in seen[1].describe(list(machine.rows)):
+    names = list(machine.rows)
+    batches = [names[start : start + 100] for start in range(0, len(names), 100)]
+    for descriptor in (descriptor for batch in batches for descriptor in seen[1].describe(batch)):
         row = machine.rows[descriptor.name]
         assert descriptor.description == row.description + (f" Unit: {row.unit}." if row.unit else ""), descriptor.name
         assert descriptor.read_only != row.live, descriptor.name
         assert descriptor.additional_constraints == row.constraint, descriptor.name
         ranges = [(r.from_value, r.to_value) for r in (*descriptor.floating_point_range, *descriptor.integer_range)]
         assert ranges == ([row.bounds] if row.bounds else []), descriptor.name
+        assert descriptor.type == PARAMETER_TYPES[row.type], descriptor.name
+
+
+def test_all_parameters_are_described_at_once(seen: tuple[Run, AxesClient], machine: Machine):
+    """In a response of limited length, with descriptions that can be shortened."""
+    for descriptor in seen[1].describe(list(machine.rows)):
+        row = machine.rows[descriptor.name]
+        text = row.description + (f" Unit: {row.unit}." if row.unit else "")
+        kept, shortened, _ = descriptor.description.partition("…")
+        assert text.startswith(kept) if shortened else kept == text, descriptor.name
         assert descriptor.type == PARAMETER_TYPES[row.type], descriptor.name
 
 

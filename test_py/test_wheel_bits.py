@@ -58,7 +58,7 @@ def test_all_columns_of_the_trace_of_the_command_are_equal(
         header, *rows = csv.reader(rows)
     columns = np.array(rows, dtype=float).T
     signals = {f"{axis}.{signal}": values for axis in machine.axes for signal, values in run.axis(axis).items()}
-    assert len(header) == 1 + 7 * len(machine.axes)
+    assert len(header) == 1 + 8 * len(machine.axes)
     for title, column in zip(header[1:], columns[1:]):
         assert np.array_equal(column, signals[title]), title
     assert np.abs(columns[0] - run.time).max() < 1e-9

@@ -112,7 +112,7 @@ def test_a_tuning_has_the_values_of_the_command(controller: str, machine: va.Mac
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"controller": "rst"}, "must be gpc or cascade"),
+        ({"controller": "rst"}, "must be gpc, cascade or contour"),
         ({"controller": "gpc", "seed": 3}, "seed requires controller cascade"),
         ({"controller": "cascade", "designs": 3}, "designs requires controller gpc"),
         ({"controller": "gpc", "designs": 0}, "1 … 1000000"),

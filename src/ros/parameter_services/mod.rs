@@ -4,6 +4,8 @@
 //! with a wrong type. The node is therefore created with `NodeOptions::new().start_parameter_services(false)` and
 //! without the spinner.
 
+mod shortened;
+
 use std::future::Future;
 use std::sync::Arc;
 
@@ -160,7 +162,8 @@ impl ParameterServices {
                     wire::descriptor_to_wire(name.clone(), descriptor)
                 });
                 let descriptors = descriptors.collect();
-                self.describe.respond(id, DescribeParametersResponse { descriptors }, permit)
+                let response = shortened::shortened(DescribeParametersResponse { descriptors });
+                self.describe.respond(id, response, permit)
             }
         }
     }

@@ -20,7 +20,7 @@ use crate::config::{KinematicsConfig, WorkpieceConfig};
 pub const STANDARD_GRAVITY: f64 = 9.80665;
 
 /// Inertia, gravity and velocity torques of a workpiece at the joints A and C, in this order; see the
-/// [equations](self).
+/// equations of this module.
 ///
 /// Angles and torques have the signs of the axes: positive A and C turn the tables about −X and −Z.
 #[derive(Debug, Clone, Copy, PartialEq)]
