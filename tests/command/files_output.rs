@@ -172,8 +172,8 @@ fn a_trace_row_can_be_at_any_tick() {
     let text = String::from_utf8(trace.finish().expect("in memory")).expect("text");
     assert_eq!(
         text,
-        "time,x.psec,x.position,x.velocity,x.current,x.current_setpoint,x.voltage,x.friction_current,\
-         c.psec,c.position,c.velocity,c.current,c.current_setpoint,c.voltage,c.friction_current\n\
-         0.006125,0.1,0.0000001,0,0,0,-3,0,0,0,0,0,0,0,0\n"
+        "time,x.psec,x.position,x.velocity,x.current,x.current_setpoint,x.voltage,x.friction_current,x.wind_up,\
+         c.psec,c.position,c.velocity,c.current,c.current_setpoint,c.voltage,c.friction_current,c.wind_up\n\
+         0.006125,0.1,0.0000001,0,0,0,-3,0,0,0,0,0,0,0,0,0,0\n"
     );
 }

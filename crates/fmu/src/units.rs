@@ -4,6 +4,7 @@
 pub(crate) fn base_unit(name: &str) -> Option<&'static str> {
     Some(match name {
         "m" => r#"m="1""#,
+        "µm" => r#"m="1" factor="1e-6""#,
         "mm" => r#"m="1" factor="0.001""#,
         "rad" => r#"rad="1""#,
         "°" => r#"rad="1" factor="0.017453292519943295""#,

@@ -1,5 +1,6 @@
 //! Validation of the couplings between axes: workpiece on two tables, gantry.
 
+use super::build::backlash_suffix;
 use super::check::{CrossChecks, missing};
 use super::error::{ConfigError, ValueSource};
 use super::machine::AxisKind;
@@ -40,6 +41,8 @@ impl CrossChecks<'_> {
             let allowed = "be 0 on a machine without rotary joints a and c, which carry the workpiece";
             return Err(self.rejection(&[WORKPIECE_MASS], allowed.to_owned()));
         }
+        let is_table = |name: &str| ["a", "c"].iter().any(|table| name.eq_ignore_ascii_case(table));
+        self.check_coupled_transmissions(WORKPIECE_MASS, is_table)?;
         let moments = MOMENTS.map(|key| self.number(key).unwrap_or_default());
         let sum: f64 = moments.iter().sum();
         if moments.iter().any(|moment| *moment > (sum - moment) * (1.0 + 1e-9)) {
@@ -78,6 +81,27 @@ impl CrossChecks<'_> {
             let wanted = format!("expected it above 0 beside {GANTRY_AXES}");
             return Err(missing(origin, GANTRY_STIFFNESS, wanted));
         }
-        Ok(())
+        let Value::TextList(names) = &entry.value else { return Ok(()) };
+        self.check_coupled_transmissions(GANTRY_AXES, |name| names.iter().any(|own| own == name))
+    }
+
+    /// Checks that coupled joints have no transmission that is stepped from event to event: its motion within a tick is not a
+    /// smooth function of the force of the coupling, so that the force would not be found.
+    fn check_coupled_transmissions(
+        &self,
+        coupling: &str,
+        is_coupled: impl Fn(&str) -> bool,
+    ) -> Result<(), ConfigError> {
+        let coupled = self.layout.joints.iter().filter(|joint| is_coupled(&joint.name));
+        let keys = coupled.flat_map(|joint| {
+            [backlash_suffix(joint.axis), "transmission.load_friction", "structure.frequency_hz"]
+                .map(|suffix| format!("{}.{suffix}", joint.name))
+        });
+        match keys.into_iter().find(|key| self.is_nonzero(key)) {
+            Some(key) => {
+                Err(self.rejection(&[&key, coupling], format!("not be given together: {key} and {coupling}")))
+            }
+            None => Ok(()),
+        }
     }
 }

@@ -104,7 +104,7 @@ impl CrossChecks<'_> {
             if is_positive(&presliding) {
                 return Err(self.rejection(
                     &[&key, &presliding],
-                    format!("not be above 0 both: {key} and {presliding}"),
+                    format!("not be given together: {key} and {presliding}"),
                 ));
             }
         }
@@ -123,7 +123,7 @@ impl CrossChecks<'_> {
         match self.number(&width).is_some_and(|value| value > 0.0) && reads_load {
             true => Err(self.rejection(
                 &[&width, &feedback],
-                format!("be {width} = 0 or {feedback} = motor: a scale at the load sees the backlash"),
+                format!("not be given together: a scale at the load ({feedback}) sees the backlash, {width} must be 0"),
             )),
             false => Ok(()),
         }

@@ -18,8 +18,10 @@ const PERIOD_US: (f64, f64) = (1.0, 50e3);
 const MAX_DELAY_MS: f64 = 100.0;
 /// Maximum distance in a machine, mm; the largest gantries have some tens of meters.
 const MAX_DISTANCE_MM: f64 = 1e5;
-/// Maximum mass of a workpiece, kg, and moment of inertia, kg·m².
-const MAX_MASS_KG: f64 = 1e6;
+/// Maximum mass of a workpiece, kg.
+const MAX_WORKPIECE_KG: f64 = 2e4;
+/// Maximum moment of inertia of a workpiece, kg·m².
+const MAX_MOMENT: f64 = 1e6;
 /// Maximum stiffness of a gantry, N/µm, and damping, N/(m/s).
 const MAX_GANTRY: (f64, f64) = (1e6, 1e9);
 /// Maximum horizon of predictive control and maximum preview of T, position cycles.
@@ -108,7 +110,7 @@ const fn tolerance(key: &'static str, unit: &'static str, max: f64) -> Parameter
 
 /// Defines a principal moment of inertia of the workpiece.
 const fn moment(key: &'static str) -> ParameterDefinition {
-    ParameterDefinition::number(key, "kg·m²", 0.0, MAX_MASS_KG).default(Number(0.0))
+    ParameterDefinition::number(key, "kg·m²", 0.0, MAX_MOMENT).default(Number(0.0))
 }
 
 /// Defines a coordinate in the machine frame, whose origin is the home position.
@@ -171,7 +173,7 @@ const MACHINE: &[ParameterDefinition] = &[
             "Gain of cross-coupled control of the linear axes, feedback of the contour error; 0 disables it.",
         ),
     // Couplings between axes.
-    ParameterDefinition::number("workpiece.mass_kg", "kg", 0.0, MAX_MASS_KG)
+    ParameterDefinition::number("workpiece.mass_kg", "kg", 0.0, MAX_WORKPIECE_KG)
         .default(Number(0.0))
         .describe("Mass of the workpiece on the tables of A and C, in addition to the inertias of the axes; 0 is no workpiece."),
     coordinate("workpiece.center_of_mass_x_mm").describe("X of the center of mass of the workpiece, in the workpiece frame."),

@@ -64,7 +64,7 @@ pub enum DriveError {
     /// Backlash, friction at the load or a structure with oscillations that a current cycle does not resolve.
     #[error(
         "the transmission changes within {} s, too fast for the current cycle of {} s with backlash, friction at the load \
-         or a structure; reduce transmission.stiffness or transmission.damping, or shorten periods.current_us",
+         or a structure; reduce stiffness or damping, increase the mass of load or structure, or shorten periods.current_us",
         Rounded(*time_s), Rounded(*period_s)
     )]
     TooFast {

@@ -179,7 +179,11 @@ impl Axis {
         let torque = holding * (p.torque_constant / plant.torque_constant());
         let voltage = p.resistance * current;
         let state = InnerLoopState {
-            motor: MotorState { current, speed: 0.0, angle: angle + p.wind_up_feedback * wind_up },
+            motor: MotorState {
+                current,
+                speed: 0.0,
+                angle: angle + p.wind_up_feedback * (wind_up + contact.structure),
+            },
             load: LoadState { wind_up, speed: 0.0 },
             contact,
             velocity: PiState { integral: torque, excess: 0.0 },

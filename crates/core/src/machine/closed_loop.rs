@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use crate::config::{
-    AxisConfig, FrictionConfig, GravityConfig, LimitsConfig, MachineConfig, Periods, PositionControllerConfig,
+    AxisConfig, FrictionConfig, GravityConfig, LimitsConfig, MachineConfig, Periods,
+    PositionControllerConfig, TransmissionConfig,
 };
 use crate::design::{DesignError, ImpulseResponse, require_stable};
 
@@ -22,7 +23,7 @@ const NEGLIGIBLE: f64 = 1e-9;
 /// Computes the response of the sampled position to an impulse of the setpoint of one position cycle (PSEC): the linear
 /// closed loop of the axis with its controllers, feedforward, delays and the deviation of its plant.
 ///
-/// The axis is simulated without friction, gravity and limits. The impulse is added to a slow motion, at which the
+/// The axis is simulated without friction, gravity, backlash and limits. The impulse is added to a slow motion, at which the
 /// fallback controller is not active, and the response to the motion alone is subtracted. The response is dimensionless
 /// and begins before the impulse if the controller has a preview.
 ///
@@ -67,12 +68,15 @@ pub fn closed_loop_response(axis: &AxisConfig, periods: &Periods) -> Result<Impu
     Ok(ImpulseResponse::new(first as i64 - impulse as i64, response[first..=last].to_vec()))
 }
 
-/// Returns the axis without friction, gravity, friction compensation and limits.
+/// Returns the axis without friction, gravity, backlash, compensations and limits.
 fn linear_axis(axis: &AxisConfig) -> AxisConfig {
     let mut linear = axis.clone();
     linear.friction = FrictionConfig { a: 0.0, c: 0.0, i0: 0.0, ..axis.friction };
     linear.gravity = GravityConfig { weight: 0.0, tilt: 0.0, ..axis.gravity };
     linear.feedforward.friction = 0.0;
+    // An axis in contact.
+    linear.transmission = axis.transmission.map(|t| TransmissionConfig { backlash: 0.0, ..t });
+    linear.position_loop.backlash_compensation.width = 0.0;
     let unlimited = f64::INFINITY;
     linear.limits = LimitsConfig { travel_min: -unlimited, travel_max: unlimited, ..axis.limits };
     linear

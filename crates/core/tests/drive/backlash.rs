@@ -5,7 +5,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use virtual_axes_core::config::{AxisConfig, MotorConfig, StructureConfig, TransmissionConfig};
 use virtual_axes_core::drive::{ContactState, EventDrivenTransmission, LoadState, MotorState, Plant};
-use virtual_axes_core::machine::{Machine, MachineParameters, SimdWidth};
+use virtual_axes_core::machine::{Machine, MachineParameters, SimdWidth, closed_loop_response};
 use virtual_axes_verification::fixtures::machines::AXES;
 
 use crate::bits::{assert_bits_of_every_width_and_part, bits, psec};
@@ -346,6 +346,39 @@ fn gravity_keeps_a_vertical_axis_at_one_side() {
         let s = machine.axis(2).sample();
         assert!((s.position - wanted).abs() < 1e-10, "{}", s.position);
     }
+}
+
+#[test]
+fn a_vertical_axis_on_a_structure_stays_at_rest() {
+    let z = [
+        "z.transmission.stiffness_n_um=50",
+        "z.transmission.load_mass_kg=300",
+        "z.gravity.weight_n=2000",
+        "z.structure.frequency_hz=20",
+        "z.structure.mass_kg=3000",
+    ];
+    let displacement = 2000.0 / (3000.0 * (20.0 * std::f64::consts::TAU).powi(2));
+    for (feedback, wanted) in [("motor", -2000.0 / 50e6 - displacement), ("load", -displacement)] {
+        let feedback = format!("z.position_loop.feedback={feedback}");
+        let config = machine(&[&z[..], &[&feedback]].concat());
+        let mut machine =
+            Machine::new(Arc::new(MachineParameters::new(&config).expect("can be discretized")));
+        for _ in 0..300 {
+            let position = machine.motion_at_end(2)[0];
+            assert!((position - wanted).abs() < 1e-12, "{feedback}: {position:e}, not {wanted:e}");
+            machine.advance(&[0.0; AXES], &[]);
+        }
+    }
+}
+
+/// The closed loop for learning is that of an axis in contact.
+#[test]
+fn the_closed_loop_leaves_out_the_gap() {
+    let elastic = machine(&ELASTIC_X);
+    let gap = machine(&[&ELASTIC_X[..], &BACKLASH_X, &["x.backlash_compensation.width_um=10"]].concat());
+    let [wanted, found] = [elastic, gap]
+        .map(|config| closed_loop_response(&config.axes()[X], &config.periods()).expect("settles"));
+    assert_eq!(found, wanted);
 }
 
 /// Static deflection of the structure under a force at the load: the scale of the axis does not see it.

@@ -4,7 +4,7 @@ use super::delays::DelayParameter;
 use super::identification::Identification;
 use super::options::IdentificationInput;
 use super::validate::Agreement;
-use crate::recording::{Finding, Signals};
+use crate::recording::{Finding, Severity, Signals};
 use virtual_axes_core::config::{AxisConfig, AxisKind};
 use virtual_axes_core::units::{DEGREE, MILLISECOND_NS, POSITION_GAIN, RPM, Rounded};
 
@@ -12,6 +12,8 @@ use virtual_axes_core::units::{DEGREE, MILLISECOND_NS, POSITION_GAIN, RPM, Round
 const LARGEST_FACTOR: f64 = 3.0;
 /// Smallest R² of the current.
 const LEAST_DETERMINATION: f64 = 0.9;
+/// Code of the finding of a smaller one.
+const POOR_CURRENT: &str = "poor-current";
 /// Recorded speed relative to the limit of the motor from which the transmission cannot be right.
 const FASTEST: f64 = 1.1;
 /// Position residual, m and rad, that is good enough whatever a constant lag leaves.
@@ -53,14 +55,19 @@ pub(super) fn report_invalid(inputs: &[IdentificationInput<'_>], found: &mut Ide
         // β and γ can be short, and a machine file often has values of another machine.
         match fit.delay {
             DelayParameter::Alpha => invalid.push(far(name, given, value, " ms", remedy)),
-            _ => invalid.push(Finding {
-                severity: crate::recording::Severity::Warning,
-                ..far(name, given, value, " ms", remedy)
-            }),
+            _ => invalid
+                .push(Finding { severity: Severity::Warning, ..far(name, given, value, " ms", remedy) }),
         }
     }
     for (input, agreement) in inputs.iter().zip(&found.agreements) {
-        invalid.extend(invalid_agreement(&input.signals.name, agreement, after.kind()));
+        let mut findings = invalid_agreement(&input.signals.name, agreement, after.kind());
+        if found.presliding.is_some() {
+            // The inverse dynamics have no presliding, which is a large part of the current of slow reversals.
+            for finding in findings.iter_mut().filter(|finding| finding.code == POOR_CURRENT) {
+                finding.severity = Severity::Warning;
+            }
+        }
+        invalid.extend(findings);
         invalid.extend(too_fast(input.signals, after));
     }
     found.findings.extend(invalid);
@@ -89,7 +96,7 @@ pub fn invalid_agreement(name: &str, agreement: &Agreement, kind: AxisKind) -> V
     let best = inverse.into_iter().chain(agreement.current_r_squared()).reduce(f64::max);
     if let Some(r2) = best.filter(|r2| *r2 < LEAST_DETERMINATION) {
         invalid.push(Finding::invalid(
-            "poor-current",
+            POOR_CURRENT,
             format!("{name}: the model explains {} of the current", explained(r2)),
             "check units, torque constant and transmission; record without cutting forces",
         ));

@@ -43,8 +43,18 @@ fn a_structure_needs_frequency_and_mass() {
 fn presliding_has_no_gap() {
     assert_eq!(
         with_elasticity(&["x.transmission.backlash_um=5", "x.friction.presliding_stiffness_n_um=50"]),
-        "test: x.friction.presliding_stiffness_n_um = 50: must not be above 0 both: x.transmission.backlash_um and \
+        "test: x.friction.presliding_stiffness_n_um = 50: must not be given together: x.transmission.backlash_um and \
          x.friction.presliding_stiffness_n_um"
+    );
+}
+
+#[test]
+fn coupled_axes_have_no_gap() {
+    let a = ["a.transmission.stiffness_nm_rad=2e6", "a.transmission.load_inertia_kg_m2=12"];
+    let text = rejection(&[&a[..], &["a.transmission.load_friction=0.5", "workpiece.mass_kg=100"]].concat());
+    assert_eq!(
+        text,
+        "test: workpiece.mass_kg = 100: must not be given together: a.transmission.load_friction and workpiece.mass_kg"
     );
 }
 
@@ -53,7 +63,7 @@ fn compensation_is_for_an_encoder_at_the_motor() {
     let text = with_elasticity(&["x.backlash_compensation.width_um=5", "x.position_loop.feedback=load"]);
     assert_eq!(
         text,
-        "test: x.position_loop.feedback = load: must be x.backlash_compensation.width_um = 0 or \
-         x.position_loop.feedback = motor: a scale at the load sees the backlash"
+        "test: x.position_loop.feedback = load: must not be given together: a scale at the \
+         load (x.position_loop.feedback) sees the backlash, x.backlash_compensation.width_um must be 0"
     );
 }

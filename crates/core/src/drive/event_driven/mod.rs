@@ -62,6 +62,8 @@ pub struct EventDrivenTransmission {
     backlash: f64,
     /// k, N·m/rad.
     stiffness: f64,
+    /// Stiffness ks of the structure, N·m/rad; infinite without one.
+    structure_stiffness: f64,
     /// k/d, 1/s; infinite without damping.
     relaxation: f64,
     /// Share of the friction that acts at the load.
@@ -128,6 +130,7 @@ impl EventDrivenTransmission {
             systems: Box::new(systems),
             backlash: t.backlash,
             stiffness: t.stiffness,
+            structure_stiffness: t.structure.map_or(f64::INFINITY, |s| s.inertia * s.frequency * s.frequency),
             relaxation: t.stiffness / t.damping,
             load_share: t.load_friction,
             law,
@@ -137,8 +140,8 @@ impl EventDrivenTransmission {
         }))
     }
 
-    /// Returns wind-up and contact at rest under a `torque` at the load (N·m at the motor); in the middle of the gap
-    /// without one.
+    /// Returns wind-up and contact at rest, with the motor at a `torque` that holds the load (N·m at the motor); in the middle
+    /// of the gap without one. The structure has its static displacement.
     pub fn at_rest(&self, torque: f64) -> (f64, ContactState) {
         let side = match torque {
             _ if self.backlash <= 0.0 => 0.0,
@@ -146,8 +149,9 @@ impl EventDrivenTransmission {
             _ => torque.signum(),
         };
         let twist = torque / self.stiffness;
-        let contact = ContactState { side, twist, ..ContactState::default() };
-        (twist + side * self.backlash / 2.0, contact)
+        let structure = -torque / self.structure_stiffness;
+        let contact = ContactState { side, twist, structure, structure_speed: 0.0 };
+        (twist + side * self.backlash / 2.0 - structure, contact)
     }
 
     /// Steps motor, load and structure by one tick; returns the mean torque of all friction over it, N·m at the motor.
