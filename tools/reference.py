@@ -161,7 +161,7 @@ slow subscribers drops samples, and [`/diagnostics`](diagnostics.md) counts them
 their subscribers, at most 30 s for one that takes no samples; idle axes run at wall-clock rate. A client that submits
 many trajectories at once needs a queue for two messages of `~/trajectory_result` per trajectory. Up to 64 trajectories
 wait on `psec`, so the memory of the node grows to 64 times the largest message. A service response has at most
-65 380 octets."""
+65 380 octets; `describe_parameters` shortens the descriptions where many parameters are requested at once."""
 
 
 def type_link(name: str) -> str:

@@ -19,7 +19,7 @@ const MAX_DELAY_MS: f64 = 100.0;
 /// Maximum distance in a machine, mm; the largest gantries have some tens of meters.
 const MAX_DISTANCE_MM: f64 = 1e5;
 /// Maximum mass of a workpiece, kg.
-const MAX_WORKPIECE_KG: f64 = 2e4;
+const MAX_WORKPIECE_KG: f64 = 5e4;
 /// Maximum moment of inertia of a workpiece, kg·m².
 const MAX_MOMENT: f64 = 1e6;
 /// Maximum stiffness of a gantry, N/µm, and damping, N/(m/s).

@@ -75,7 +75,8 @@ fn linear_axis(axis: &AxisConfig) -> AxisConfig {
     linear.gravity = GravityConfig { weight: 0.0, tilt: 0.0, ..axis.gravity };
     linear.feedforward.friction = 0.0;
     // An axis in contact.
-    linear.transmission = axis.transmission.map(|t| TransmissionConfig { backlash: 0.0, ..t });
+    linear.transmission =
+        axis.transmission.map(|t| TransmissionConfig { backlash: 0.0, load_friction: 0.0, ..t });
     linear.position_loop.backlash_compensation.width = 0.0;
     let unlimited = f64::INFINITY;
     linear.limits = LimitsConfig { travel_min: -unlimited, travel_max: unlimited, ..axis.limits };
