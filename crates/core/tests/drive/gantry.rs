@@ -1,38 +1,20 @@
 //! Gantry: two linear axes coupled by a beam, against closed forms.
 
-use std::sync::Arc;
-
 use virtual_axes_core::config::{MachineConfig, Parameters, ValueSource, parse_assignment};
-use virtual_axes_core::machine::{Machine, MachineParameters};
-use virtual_axes_verification::fixtures::machines::{AXES, configured_with};
+use virtual_axes_core::machine::Machine;
+use virtual_axes_verification::fixtures::machines::AXES;
+
+use crate::unpowered::{machine, unpowered};
 
 const X: usize = 0;
 const Y: usize = 1;
 const BEAM: [&str; 3] = ["gantry.axes=[x, y]", "gantry.stiffness_n_um=200", "gantry.damping_n_s_m=60000"];
 
-fn machine(config: &MachineConfig) -> Machine {
-    Machine::new(Arc::new(MachineParameters::new(config).expect("can be discretized")))
-}
-
 /// Returns the machine with X and Y without friction and current.
 fn free_axes(tick_us: f64, beam: &[&str]) -> MachineConfig {
-    const FREE: [&str; 9] = [
-        "friction.a=0",
-        "friction.c=0",
-        "friction.i0=0",
-        "motor.torque_constant_nm_a=1e-9",
-        "motor.emf_constant_v_s_rad=0",
-        "position_loop.gain=0",
-        "velocity_loop.gain=0",
-        "current_loop.gain=0",
-        "feedforward.velocity=0",
-    ];
-    let of_axes = ["x", "y"].iter().flat_map(|axis| FREE.map(|text| format!("{axis}.{text}")));
-    let changes = Vec::from_iter(
-        of_axes.chain(["y.motor.inertia_kg_m2=0.011".to_owned(), format!("periods.current_us={tick_us}")]),
-    );
-    let changes = changes.iter().map(String::as_str).chain(beam.iter().copied());
-    configured_with("mikron_ucp710", &[], &Vec::from_iter(changes))
+    let own = ["y.motor.inertia_kg_m2=0.011".to_owned(), format!("periods.current_us={tick_us}")];
+    let own = own.iter().map(String::as_str).chain(beam.iter().copied());
+    unpowered(["x", "y"], &Vec::from_iter(own))
 }
 
 /// Returns the mass of an axis, kg.

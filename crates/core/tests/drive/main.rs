@@ -15,4 +15,5 @@ mod simd;
 mod stored_states;
 mod transmission;
 mod two_masses;
+mod unpowered;
 mod workpiece;

@@ -13,6 +13,7 @@ use virtual_axes_verification::fixtures::machines::{AXES, configured_with, progr
 
 use crate::bits::bits;
 use crate::parameter_ranges::golden;
+use crate::unpowered::{machine, unpowered};
 
 const A: usize = 3;
 const C: usize = 4;
@@ -34,28 +35,11 @@ pub const WORKPIECE: [&str; 12] = [
 /// Time of the torques in `workpiece_motion.csv`, and between its rows, in position cycles of 6 ms.
 const INTERVAL: usize = 8;
 
-fn machine(config: &MachineConfig) -> Machine {
-    Machine::new(Arc::new(MachineParameters::new(config).expect("can be discretized")))
-}
-
 /// Returns the machine with A and C without friction, current and tilt of the table.
 fn free_tables(tick_us: f64, workpiece: &[&str]) -> MachineConfig {
-    const FREE: [&str; 9] = [
-        "friction.a=0",
-        "friction.c=0",
-        "friction.i0=0",
-        "motor.torque_constant_nm_a=1e-9",
-        "motor.emf_constant_v_s_rad=0",
-        "position_loop.gain=0",
-        "velocity_loop.gain=0",
-        "current_loop.gain=0",
-        "feedforward.velocity=0",
-    ];
-    let of_tables = ["a", "c"].iter().flat_map(|axis| FREE.map(|text| format!("{axis}.{text}")));
     let own = ["a.gravity.tilt_nm=0".to_owned(), format!("periods.current_us={tick_us}")];
-    let changes = Vec::from_iter(of_tables.chain(own));
-    let changes = changes.iter().map(String::as_str).chain(workpiece.iter().copied());
-    configured_with("mikron_ucp710", &[], &Vec::from_iter(changes))
+    let own = own.iter().map(String::as_str).chain(workpiece.iter().copied());
+    unpowered(["a", "c"], &Vec::from_iter(own))
 }
 
 #[test]
