@@ -20,10 +20,14 @@ use super::plant::{
     FrictionConfig, GravityConfig, MotorConfig, PreslidingConfig, StribeckConfig, StructureConfig,
     TransmissionConfig,
 };
+use super::plant_keys::{
+    backlash_suffix, compensation_suffix, gap_unit, presliding_suffixes, stiffness_unit, structure_suffix,
+    transmission_suffixes,
+};
 use super::value::Value;
 use crate::units::{
-    DEGREE, METER_PER_MINUTE, MICROMETER, MICROSECOND_NS, MILLIHENRY, MILLIMETER, MILLISECOND,
-    MILLISECOND_NS, NEWTON_PER_MICROMETER, POSITION_GAIN, REVOLUTION, RPM,
+    DEGREE, METER_PER_MINUTE, MICROSECOND_NS, MILLIHENRY, MILLIMETER, MILLISECOND, MILLISECOND_NS,
+    NEWTON_PER_MICROMETER, POSITION_GAIN, REVOLUTION, RPM,
 };
 
 impl Parameters {
@@ -114,68 +118,6 @@ impl Parameters {
 
     pub(super) fn flag(&self, key: &str) -> bool {
         self.get(key) == Some(Value::Bool(true))
-    }
-}
-
-/// Returns the keys of stiffness, damping and load inertia of an elastic transmission, without the name of the axis.
-pub(super) fn transmission_suffixes(axis: AxisKind) -> [&'static str; 3] {
-    match axis {
-        AxisKind::Linear => {
-            ["transmission.stiffness_n_um", "transmission.damping_n_s_m", "transmission.load_mass_kg"]
-        }
-        AxisKind::Rotary => [
-            "transmission.stiffness_nm_rad",
-            "transmission.damping_nm_s_rad",
-            "transmission.load_inertia_kg_m2",
-        ],
-    }
-}
-
-/// Returns the key of the inertia of the structure, without the name of the axis.
-pub(super) fn structure_suffix(axis: AxisKind) -> &'static str {
-    match axis {
-        AxisKind::Linear => "structure.mass_kg",
-        AxisKind::Rotary => "structure.inertia_kg_m2",
-    }
-}
-
-/// Returns the key of the backlash, without the name of the axis.
-pub(super) fn backlash_suffix(axis: AxisKind) -> &'static str {
-    match axis {
-        AxisKind::Linear => "transmission.backlash_um",
-        AxisKind::Rotary => "transmission.backlash_deg",
-    }
-}
-
-/// Returns the key of the width of the backlash compensation, without the name of the axis.
-pub(super) fn compensation_suffix(axis: AxisKind) -> &'static str {
-    match axis {
-        AxisKind::Linear => "backlash_compensation.width_um",
-        AxisKind::Rotary => "backlash_compensation.width_deg",
-    }
-}
-
-/// Returns the unit of the width of a gap, m or rad.
-fn gap_unit(axis: AxisKind) -> f64 {
-    match axis {
-        AxisKind::Linear => MICROMETER,
-        AxisKind::Rotary => DEGREE,
-    }
-}
-
-/// Returns the keys of stiffness and damping of the presliding, without the name of the axis.
-pub(super) fn presliding_suffixes(axis: AxisKind) -> [&'static str; 2] {
-    match axis {
-        AxisKind::Linear => ["friction.presliding_stiffness_n_um", "friction.presliding_damping_n_s_m"],
-        AxisKind::Rotary => ["friction.presliding_stiffness_nm_rad", "friction.presliding_damping_nm_s_rad"],
-    }
-}
-
-/// Returns the unit of a stiffness at an axis, N/m or N·m/rad.
-fn stiffness_unit(axis: AxisKind) -> f64 {
-    match axis {
-        AxisKind::Linear => NEWTON_PER_MICROMETER,
-        AxisKind::Rotary => 1.0,
     }
 }
 

@@ -1,9 +1,9 @@
 //! Validation of the couplings between axes: workpiece on two tables, gantry.
 
-use super::build::backlash_suffix;
 use super::check::{CrossChecks, missing};
 use super::error::{ConfigError, ValueSource};
 use super::machine::AxisKind;
+use super::plant_keys::backlash_suffix;
 use super::value::Value;
 
 pub(super) const WORKPIECE_MASS: &str = "workpiece.mass_kg";

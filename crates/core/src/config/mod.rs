@@ -28,6 +28,7 @@ mod parameter_file;
 mod parameters;
 mod plant;
 mod plant_check;
+mod plant_keys;
 mod plant_schema;
 mod schema;
 mod value;

@@ -2,14 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use super::build::{
-    backlash_suffix, compensation_suffix, presliding_suffixes, structure_suffix, transmission_suffixes,
-};
 use super::check::{CrossChecks, DIRECT, missing};
 use super::definition::MotorKind;
 use super::error::{ConfigError, ValueSource};
 use super::layout::JointVariant;
 use super::machine::AxisKind;
+use super::plant_keys::{
+    backlash_suffix, compensation_suffix, presliding_suffixes, structure_suffix, transmission_suffixes,
+};
 use super::value::{Value, number_text};
 use crate::units::{MILLIMETER, Rounded};
 
