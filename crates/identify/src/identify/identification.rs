@@ -8,6 +8,7 @@ use super::gravity::{GravityFit, SteadyMeasurements};
 use super::inertia::InertiaFit;
 use super::presliding::PreslidingFit;
 use super::refine::Refinement;
+use super::transmission::TransmissionFit;
 use super::validate::Agreement;
 use crate::recording::Finding;
 use virtual_axes_core::config::{AxisConfig, Periods};
@@ -37,6 +38,8 @@ pub struct Identification {
     /// Stiffness σ0 of the presliding at the axis, N/m or N·m/rad, below which the recordings exclude it; none if the
     /// presliding was identified or not searched for.
     pub excluded_presliding: Option<f64>,
+    /// Elastic transmission, from recordings with both encoders.
+    pub transmission: Option<TransmissionFit>,
     /// VFFW and TFFW by regression.
     pub feedforward: FeedforwardFit,
     /// Identified delays α, β, γ.

@@ -36,6 +36,7 @@ mod segments;
 mod setpoints;
 mod steps;
 mod trace_experiments;
+mod transmission;
 mod validate;
 mod values;
 
@@ -59,7 +60,8 @@ pub use refine::{RefinedParameter, RefinedValue, Refinement, refine};
 pub(crate) use resample::BandLimitedSpline;
 pub use sanity::invalid_agreement;
 pub use segments::{MotionSegment, SegmentKind, find_segments};
-pub use steps::identify;
+pub use steps::{identify, identify_with_transmission};
+pub use transmission::{Interval, MassesFit, TransmissionFit};
 pub use validate::{
     Agreement, Baseline, ExperimentComparison, InverseDynamics, ResidualStatistics, constant_lag, validate,
 };

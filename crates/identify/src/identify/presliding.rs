@@ -10,7 +10,8 @@
 mod profile;
 mod reversal;
 
-use self::profile::{LengthProfile, student};
+use self::profile::LengthProfile;
+pub(super) use self::profile::student;
 use self::reversal::{Reversal, SpanMotion};
 use crate::recording::{Finding, GaussianFilter, Signals, deviation};
 use virtual_axes_core::config::{AxisConfig, AxisKind, PreslidingConfig};

@@ -15,6 +15,7 @@ use super::presliding::fit_presliding;
 use super::production::{are_production_traces, identify_production};
 use super::refine::RefinedParameter;
 use super::sanity::report_invalid;
+use super::transmission::fit_transmission;
 use super::segments::{MotionSegment, SegmentKind, find_segments};
 use super::validate::compute_agreement;
 use crate::recording::{Finding, Signals};
@@ -28,20 +29,24 @@ pub fn identify(
     periods: &Periods,
     options: &IdentificationOptions,
 ) -> Identification {
+    identify_with_transmission(inputs, &[], axis, periods, options)
+}
+
+/// Identifies `axis` as [`identify`], and its elastic transmission from recordings with both encoders, `transmission`.
+pub fn identify_with_transmission(
+    inputs: &[IdentificationInput<'_>],
+    transmission: &[&Signals],
+    axis: &AxisConfig,
+    periods: &Periods,
+    options: &IdentificationOptions,
+) -> Identification {
     let mut steps = IdentificationSteps::new(inputs, axis, periods, options);
-    if are_production_traces(inputs, &steps.found.axis, periods) {
-        identify_production(inputs, periods, options.refine, &mut steps.found);
-        steps.find_production_experiments();
-    } else {
-        steps.fit_plant();
-        // The closed loop needs an approximate presliding only, and the presliding the inertia of the closed loop.
-        steps.fit_presliding(&mut Vec::new());
-        steps.fit_feedforward_weights();
-        steps.fit_closed_loop();
+    if !inputs.is_empty() {
+        steps.fit_axis();
     }
-    let mut findings = Vec::new();
-    steps.fit_presliding(&mut findings);
-    steps.found.findings.append(&mut findings);
+    if !transmission.is_empty() {
+        steps.fit_transmission(transmission);
+    }
     steps.finish()
 }
 
@@ -89,6 +94,7 @@ impl<'a> IdentificationSteps<'a> {
                 inertia: None,
                 presliding: None,
                 excluded_presliding: None,
+                transmission: None,
                 replayed_inertia: None,
                 feedforward: FeedforwardFit::default(),
                 delays: Vec::new(),
@@ -99,6 +105,24 @@ impl<'a> IdentificationSteps<'a> {
                 findings,
             },
         }
+    }
+
+    /// Fits the parameters of the rigid axis, with its presliding if the options ask for it.
+    fn fit_axis(&mut self) {
+        let (inputs, periods) = (self.inputs, self.periods);
+        if are_production_traces(inputs, &self.found.axis, periods) {
+            identify_production(inputs, periods, self.options.refine, &mut self.found);
+            self.find_production_experiments();
+        } else {
+            self.fit_plant();
+            // The closed loop needs an approximate presliding only, and the presliding the inertia of the closed loop.
+            self.fit_presliding(&mut Vec::new());
+            self.fit_feedforward_weights();
+            self.fit_closed_loop();
+        }
+        let mut findings = Vec::new();
+        self.fit_presliding(&mut findings);
+        self.found.findings.append(&mut findings);
     }
 
     /// Fits gravity, friction and inertia in two passes; the second corrects for residual accelerations with
@@ -171,6 +195,17 @@ impl<'a> IdentificationSteps<'a> {
             };
         if let Some(presliding) = &found.presliding {
             presliding.apply(&mut found.axis);
+        }
+    }
+
+    /// Fits the transmission; the inertia of the axis is that of motor and load if the other recordings do not tell it.
+    fn fit_transmission(&mut self, recordings: &[&Signals]) {
+        let found = &mut self.found;
+        found.transmission = fit_transmission(recordings, &found.axis, &mut found.findings);
+        let Some(fit) = &found.transmission else { return };
+        fit.apply(&mut found.axis);
+        if let (true, Some(masses)) = (self.inputs.is_empty(), &fit.masses) {
+            found.axis.motor.inertia = masses.total.value * found.axis.transmission_ratio.powi(2);
         }
     }
 

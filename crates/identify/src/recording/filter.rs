@@ -71,6 +71,12 @@ impl GaussianFilter {
         self.value.len()
     }
 
+    /// Returns the standard deviation of the smoothed value of white noise, relative to that of the noise.
+    pub(crate) fn noise_gain(&self) -> f64 {
+        let middle = 1.0 - 2.0 * self.value.iter().sum::<f64>();
+        self.value.iter().map(|weight| 2.0 * weight * weight).sum::<f64>().sqrt().hypot(middle)
+    }
+
     /// Returns smoothed value and derivatives of `signal`, which must be longer than the kernel.
     ///
     /// Beyond its ends the signal is continued by odd reflection about the end value, x(−k) = 2 x(0) − x(k).

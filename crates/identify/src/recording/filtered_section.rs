@@ -3,7 +3,7 @@
 use super::SignalSpan;
 use super::filter::{FilteredSignal, GaussianFilter};
 use super::spans::{
-    CURRENT, POSITION, PSEC, RecordingSection, TORQUE_FEEDFORWARD, VELOCITY, VELOCITY_FEEDFORWARD,
+    CURRENT, MOTOR_POSITION, POSITION, PSEC, RecordingSection, TORQUE_FEEDFORWARD, VELOCITY, VELOCITY_FEEDFORWARD,
 };
 
 /// Section of a recording after filtering.
@@ -55,6 +55,7 @@ impl<'a> FilteredSection<'a> {
             smooth_current: self.smooth_current,
             velocity_feedforward: columns[VELOCITY_FEEDFORWARD].take(),
             torque_feedforward: columns[TORQUE_FEEDFORWARD].take(),
+            motor_position: columns[MOTOR_POSITION].take(),
         }
     }
 }

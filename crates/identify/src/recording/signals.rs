@@ -21,6 +21,8 @@ pub struct RawRecording {
     pub velocity_feedforward: Option<Vec<f64>>,
     /// TFFWS, N·m at the motor (N of a linear motor).
     pub torque_feedforward: Option<Vec<f64>>,
+    /// Position of the motor at the axis, m or rad, beside that of the load in `position`.
+    pub motor_position: Option<Vec<f64>>,
 }
 
 /// Conditioned recording: uniform sampling within each span, with zero-phase derivatives.
@@ -64,4 +66,6 @@ pub struct SignalSpan {
     pub velocity_feedforward: Option<Vec<f64>>,
     /// TFFWS, N·m at the motor.
     pub torque_feedforward: Option<Vec<f64>>,
+    /// Recorded position of the motor at the axis, m or rad.
+    pub motor_position: Option<Vec<f64>>,
 }

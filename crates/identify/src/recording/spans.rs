@@ -5,16 +5,24 @@ use super::{Finding, RawRecording};
 use virtual_axes_core::statistics::{median, quantile};
 
 /// Number of channels; the first is the position.
-pub(super) const CHANNELS: usize = 6;
+pub(super) const CHANNELS: usize = 7;
 pub(super) const POSITION: usize = 0;
 pub(super) const PSEC: usize = 1;
 pub(super) const VELOCITY: usize = 2;
 pub(super) const CURRENT: usize = 3;
 pub(super) const VELOCITY_FEEDFORWARD: usize = 4;
 pub(super) const TORQUE_FEEDFORWARD: usize = 5;
+pub(super) const MOTOR_POSITION: usize = 6;
 /// Names of the channels in messages.
-pub(super) const NAMES: [&str; CHANNELS] =
-    ["position", "PSEC", "velocity", "current", "velocity feedforward", "torque feedforward"];
+pub(super) const NAMES: [&str; CHANNELS] = [
+    "position",
+    "PSEC",
+    "velocity",
+    "current",
+    "velocity feedforward",
+    "torque feedforward",
+    "motor position",
+];
 /// Values of each channel, one per sample.
 pub(super) type ChannelColumns = [Option<Vec<f64>>; CHANNELS];
 
@@ -100,6 +108,7 @@ pub(super) fn channels(raw: &RawRecording) -> [Option<&Vec<f64>>; CHANNELS] {
         raw.current.as_ref(),
         raw.velocity_feedforward.as_ref(),
         raw.torque_feedforward.as_ref(),
+        raw.motor_position.as_ref(),
     ]
 }
 
@@ -232,11 +241,16 @@ fn resample(block: &SampleBlock, columns: &ChannelColumns, period: f64) -> Chann
                 while at + 1 < nodes.len() && nodes[at + 1].0 <= time + AT * period {
                     at += 1;
                 }
-                interpolate(&nodes, at, time, period, n <= VELOCITY)
+                interpolate(&nodes, at, time, period, is_smooth(n))
             })
             .collect()
     };
     std::array::from_fn(|n| columns[n].as_ref().map(|values| interpolate((n, values))))
+}
+
+/// Returns true for positions and velocities.
+fn is_smooth(channel: usize) -> bool {
+    channel <= VELOCITY || channel == MOTOR_POSITION
 }
 
 /// Interpolates at `time` between node `at` and the next one: cubic if `smooth`, otherwise linear.
@@ -323,7 +337,7 @@ fn interpolate_missing(column: &mut Option<Vec<f64>>, channel: usize) -> usize {
                 near.into_iter().filter_map(value).filter(|(_, v)| !v.is_nan()).collect();
             let before = usize::from(nodes.first().is_some_and(|node| node.0 < (n - 1) as f64));
             for (j, missing) in values.iter_mut().enumerate().skip(n).take(run) {
-                *missing = interpolate(&nodes, before, j as f64, 1.0, channel <= VELOCITY);
+                *missing = interpolate(&nodes, before, j as f64, 1.0, is_smooth(channel));
             }
             bridged += run;
         }

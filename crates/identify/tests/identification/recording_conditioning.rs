@@ -76,6 +76,7 @@ fn sampled(period: f64, samples: usize) -> RawRecording {
         current: of(&|t| current(t - 0.009)),
         velocity_feedforward: None,
         torque_feedforward: None,
+        motor_position: None,
         time,
     }
 }

@@ -222,6 +222,7 @@ impl HiddenAxis {
             current: Some(noisy(&current, recorder.current_noise * largest, recorder.current_resolution)),
             velocity_feedforward: None,
             torque_feedforward: None,
+            motor_position: None,
             time: stored.stamps,
         })
     }

@@ -76,7 +76,7 @@ impl LengthProfile {
 
 /// Returns the 97.5 % quantile of Student's distribution, by the expansion of Cornish and Fisher in powers of
 /// 1 / `freedom`; the error is below 1 % from three degrees of freedom on.
-pub(super) fn student(freedom: usize) -> f64 {
+pub(in crate::identify) fn student(freedom: usize) -> f64 {
     let n = freedom as f64;
     1.959_964 + (2.372_27 + (2.822_5 + 2.555_9 / n) / n) / n
 }

@@ -1,0 +1,321 @@
+//! Identification of an elastic transmission from recordings with the encoders of motor and load.
+//!
+//! The load follows the force of the contact, the motor both (docs/explanation/model.md, elastic transmission), here at the
+//! axis:
+//!
+//! ```text
+//! Ml a_load = k c(δ) + d dc(δ)/dt − C_load − G          c(δ): twist δ beyond the gap
+//! Kt i / r  = Mm a_motor + Ml a_load + C(V) + G
+//! ```
+//!
+//! The first equation gives k/Ml, d/Ml and the gap, without a current. Only the second, above the frequencies at which motor
+//! and load move as one, tells Ml from Mm. All signals pass the same filter without phase; the nonlinear function c(δ) is
+//! evaluated before it.
+
+mod block_regression;
+mod contact;
+mod motion;
+
+use std::f64::consts::TAU;
+
+use self::block_regression::{BlockRegression, scatter};
+use self::contact::{BLOCKS, ContactFit, Gap, fit_contact};
+use self::motion::TwoEncoderMotion;
+use super::presliding::student;
+use crate::recording::{Finding, Signals};
+use virtual_axes_core::config::{AxisConfig, AxisKind, TransmissionConfig};
+use virtual_axes_core::units::{MILLISECOND, NEWTON_PER_MICROMETER, Rounded};
+
+/// Smallest spread of the twist in standard deviations by the encoders.
+const NOISE: f64 = 5.0;
+/// Largest half of a 95 % interval, relative to the value.
+const UNCERTAIN: f64 = 0.5;
+/// Standard errors relative to the value that all blocks share, by the filter and by a sampling period of 1 ms: of the
+/// antiresonance, of values with the current, and of the damping.
+const SYSTEMATIC: [f64; 2] = [0.005, 0.0];
+const WITH_CURRENT: [f64; 2] = [0.007, 0.01];
+const OF_DAMPING: [f64; 2] = [0.02, 0.02];
+/// Standard errors of a 95 % interval.
+const INTERVAL: f64 = 1.96;
+/// Standard error of the width of the gap that all blocks share, relative to the twist by the encoders, to the spread of
+/// the twist, and to the width.
+const GAP: [f64; 3] = [1.0, 0.01, 0.01];
+
+/// Value with the bounds of its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interval {
+    /// Value.
+    pub value: f64,
+    /// Bounds.
+    pub bounds: [f64; 2],
+}
+
+impl Interval {
+    /// Creates an interval that is symmetric about the value.
+    fn about(value: f64, half: f64) -> Self {
+        Interval { value, bounds: [value - half, value + half] }
+    }
+
+    /// Returns the standard deviation of a normal distribution with the width of the interval.
+    pub fn error(&self) -> f64 {
+        (self.bounds[1] - self.bounds[0]) / (2.0 * INTERVAL)
+    }
+
+    fn is_certain(&self) -> bool {
+        self.bounds[1] - self.bounds[0] <= 2.0 * UNCERTAIN * self.value
+    }
+}
+
+/// Identified transmission of an axis, in SI units at the axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TransmissionFit {
+    /// Frequency of the antiresonance √(k/Ml)/2π, Hz.
+    pub antiresonance: Interval,
+    /// Masses and the values that need them; none if the recordings tell the antiresonance only.
+    pub masses: Option<MassesFit>,
+    /// Width of the gap, m or rad; none if it is not above 0.
+    pub backlash: Option<Interval>,
+    /// Width of the gap that is excluded, m or rad; none with an identified gap, or if one flank is never touched.
+    pub excluded_backlash: Option<f64>,
+    /// Coefficient of determination R² of the acceleration of the load.
+    pub r_squared: f64,
+}
+
+/// Values of a transmission that need the inertia of the load, in SI units at the axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MassesFit {
+    /// Inertia of the load Ml, kg or kg·m².
+    pub load: Interval,
+    /// Inertia of motor and load, kg or kg·m².
+    pub total: Interval,
+    /// Stiffness k, N/m or N·m/rad.
+    pub stiffness: Interval,
+    /// Damping d, N·s/m or N·m·s/rad; none if it is not above 0.
+    pub damping: Option<Interval>,
+}
+
+impl TransmissionFit {
+    /// Sets the transmission of an axis, if the masses were identified.
+    pub(super) fn apply(&self, axis: &mut AxisConfig) {
+        let Some(masses) = &self.masses else { return };
+        let square = axis.transmission_ratio * axis.transmission_ratio;
+        let before = axis.transmission;
+        axis.transmission = Some(TransmissionConfig {
+            stiffness: masses.stiffness.value * square,
+            damping: masses.damping.map_or(0.0, |damping| damping.value * square),
+            load_inertia: masses.load.value * square,
+            backlash: self.backlash.map_or(0.0, |gap| gap.value / axis.transmission_ratio),
+            load_friction: before.map_or(0.0, |before| before.load_friction),
+            structure: before.and_then(|before| before.structure),
+        });
+    }
+}
+
+/// Fits the transmission of `axis`, whose friction law and gravity are known, and reports findings.
+pub(super) fn fit_transmission(
+    recordings: &[&Signals],
+    axis: &AxisConfig,
+    findings: &mut Vec<Finding>,
+) -> Option<TransmissionFit> {
+    let missing: Vec<&str> = recordings
+        .iter()
+        .filter(|signals| signals.spans.iter().all(|span| span.motor_position.is_none()))
+        .map(|signals| signals.name.as_str())
+        .collect();
+    if !missing.is_empty() {
+        findings.push(Finding::missing(
+            "one-encoder",
+            format!(
+                "{}: no position of the motor beside that of the load: one encoder does not tell stiffness, inertia of the load and \
+                 backlash from the inertia and the control",
+                missing.join(", ")
+            ),
+            "record both encoders (channels position and motor_position)",
+        ));
+    }
+    let motions: Vec<TwoEncoderMotion> = recordings
+        .iter()
+        .flat_map(|signals| {
+            signals.spans.iter().filter_map(|span| TwoEncoderMotion::new(span, signals, axis))
+        })
+        .collect();
+    if motions.is_empty() {
+        return None;
+    }
+    let period = recordings.iter().map(|signals| signals.period).fold(0.0, f64::max);
+    let fit = TransmissionSearch { motions: &motions, axis, period };
+    match fit.run(findings) {
+        Ok(found) => Some(found),
+        Err(finding) => {
+            findings.push(finding);
+            None
+        }
+    }
+}
+
+struct TransmissionSearch<'a> {
+    motions: &'a [TwoEncoderMotion],
+    axis: &'a AxisConfig,
+    /// Longest sampling period, s.
+    period: f64,
+}
+
+impl TransmissionSearch<'_> {
+    fn run(&self, findings: &mut Vec<Finding>) -> Result<TransmissionFit, Finding> {
+        let has_tilt = self.axis.kind() == AxisKind::Rotary && self.axis.gravity.tilt != 0.0;
+        let no_motion = || {
+            Finding::missing(
+                "no-wind-up",
+                "no transmission: the recordings with both encoders contain no motion",
+                "record a chirp of the setpoint and some reversals",
+            )
+        };
+        let closed = fit_contact(self.motions, has_tilt, Gap::Closed).ok_or_else(no_motion)?;
+        let free = fit_contact(self.motions, has_tilt, Gap::Free).ok_or_else(no_motion)?;
+        let gap = self.gap(&free);
+        let is_open = gap.is_some_and(|gap| gap.is_certain());
+        let contact = if is_open { &free } else { &closed };
+        let antiresonance =
+            self.interval(&contact.stiffness, SYSTEMATIC, |stiffness| stiffness.max(0.0).sqrt() / TAU);
+        if contact.spread < NOISE * contact.noise || !antiresonance.is_certain() {
+            return Err(self.too_stiff(contact, antiresonance));
+        }
+        if free.widths.is_none() {
+            findings.push(Finding::warning(
+                "one-flank",
+                "backlash is not identified: the load rests on one side of the transmission in all recordings",
+                "record reversals with accelerations or friction that move the load to the other side",
+            ));
+        }
+        let excluded_backlash = gap.filter(|_| !is_open).map(|gap| gap.bounds[1].max(0.0));
+        let masses = self.masses(contact);
+        if masses.is_none() {
+            findings.push(Finding::missing(
+                "no-load-inertia",
+                format!(
+                    "stiffness and inertia of the load are not identified, only their antiresonance of {:.1} Hz: the recordings do \
+                     not tell the inertia of the load from that of the motor",
+                    antiresonance.value
+                ),
+                "record the current with a chirp of the setpoint that reaches the antiresonance",
+            ));
+        }
+        Ok(TransmissionFit {
+            antiresonance,
+            masses,
+            backlash: gap.filter(|_| is_open),
+            excluded_backlash,
+            r_squared: contact.r_squared,
+        })
+    }
+
+    /// Returns the width of the gap; none if one flank is never touched.
+    fn gap(&self, fit: &ContactFit) -> Option<Interval> {
+        let sizes = [fit.noise, fit.spread, fit.gap[1]];
+        let shared = sizes.iter().zip(GAP).map(|(x, part)| x * part).fold(0.0, f64::hypot);
+        let half = (student(BLOCKS - 1) * scatter(fit.widths.as_ref()?)).hypot(INTERVAL * shared);
+        Some(Interval::about(fit.gap[1], half))
+    }
+
+    /// Returns the finding about a twist that the encoders do not resolve.
+    fn too_stiff(&self, fit: &ContactFit, antiresonance: Interval) -> Finding {
+        let (unit, name) = match self.axis.kind() {
+            AxisKind::Linear => (1e-6, "µm"),
+            AxisKind::Rotary => (1.0, "rad"),
+        };
+        let what = format!(
+            "no transmission: motor and load differ by {} {name} (standard deviation) in time with the acceleration, the encoders \
+             resolve {} {name}; an antiresonance below {:.1} Hz is excluded",
+            Rounded(fit.spread / unit),
+            Rounded(fit.noise / unit),
+            if fit.spread < NOISE * fit.noise {
+                // The acceleration would twist the transmission by more than the encoders resolve.
+                self.acceleration().max(0.0).sqrt() / (NOISE * fit.noise).sqrt() / TAU
+            } else {
+                antiresonance.bounds[0].max(0.0)
+            }
+        );
+        Finding::missing("no-wind-up", what, "record larger accelerations, or encoders of a finer resolution")
+    }
+
+    /// Returns the standard deviation of the acceleration, m/s² or rad/s².
+    fn acceleration(&self) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for motion in self.motions {
+            for i in motion.samples() {
+                sum += motion.load.second[i].powi(2);
+                count += 1.0;
+            }
+        }
+        f64::sqrt(sum / count)
+    }
+
+    /// Returns a function of a value, given also without each of the blocks, with its interval.
+    fn interval(
+        &self,
+        (value, without): &(f64, Vec<f64>),
+        [always, per_ms]: [f64; 2],
+        of: impl Fn(f64) -> f64,
+    ) -> Interval {
+        let parts: Vec<f64> = without.iter().map(|x| of(*x)).collect();
+        let value = of(*value);
+        let shared = always.hypot(per_ms * self.period / MILLISECOND);
+        let half = (student(BLOCKS - 1) * scatter(&parts)).hypot(INTERVAL * shared * value);
+        Interval::about(value, half)
+    }
+
+    /// Returns the masses; none if the current does not tell them apart.
+    fn masses(&self, contact: &ContactFit) -> Option<MassesFit> {
+        let total: usize = self.motions.iter().map(|motion| motion.samples().len()).sum();
+        // Accelerations of load and twist, friction, velocity, constant, sine and cosine of the position.
+        let mut regression = BlockRegression::new(7, BLOCKS);
+        let has_tilt = self.axis.kind() == AxisKind::Rotary;
+        let mut k = 0;
+        for motion in self.motions {
+            for i in motion.samples() {
+                k += 1;
+                let Some(force) = motion.force.as_ref().map(|force| force[i]).filter(|f| !f.is_nan()) else {
+                    continue;
+                };
+                let tilt = if has_tilt { motion.load.value[i].sin_cos() } else { (0.0, 0.0) };
+                let row = [
+                    motion.load.second[i],
+                    motion.motor.second[i] - motion.load.second[i],
+                    motion.friction[i],
+                    motion.motor.first[i],
+                    1.0,
+                    tilt.0,
+                    tilt.1,
+                ];
+                regression.add((k - 1) * BLOCKS / total, &row, force);
+            }
+        }
+        let (all, without) = regression.jackknife(7, |c| [c[0], c[1]])?;
+        let load = (all[0] - all[1], without.iter().map(|c| c[0] - c[1]).collect::<Vec<f64>>());
+        let sum = (all[0], without.iter().map(|c| c[0]).collect());
+        let product = |of_load: &(f64, Vec<f64>)| {
+            let parts = of_load.1.iter().zip(&load.1).map(|(x, mass)| x * mass);
+            (of_load.0 * load.0, parts.collect::<Vec<f64>>())
+        };
+        let (stiffness, damping) = (product(&contact.stiffness), product(&contact.damping));
+        let [stiffness, load, total] =
+            [stiffness, load, sum].map(|value| self.interval(&value, WITH_CURRENT, |x| x));
+        let damping = self.interval(&damping, OF_DAMPING, |x| x);
+        let is_certain = [load, total, stiffness].iter().all(Interval::is_certain);
+        let is_possible = load.value > 0.0 && load.value < total.value;
+        (is_certain && is_possible).then_some(MassesFit {
+            load,
+            total,
+            stiffness,
+            damping: Some(damping).filter(|damping| damping.bounds[0] > 0.0),
+        })
+    }
+}
+
+/// Returns the symbol of a stiffness at the axis, and its factor to SI.
+pub(super) fn stiffness_unit(kind: AxisKind) -> (&'static str, f64) {
+    match kind {
+        AxisKind::Linear => ("N/um", NEWTON_PER_MICROMETER),
+        AxisKind::Rotary => ("N.m/rad", 1.0),
+    }
+}
