@@ -1,7 +1,7 @@
 //! Identification of the parameters of an axis from recordings.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use numpy::PyReadonlyArray1;
@@ -9,8 +9,8 @@ use pyo3::prelude::*;
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::identify::{
-    AxisIdentification, Breakaway, ConditionedRecording, FeedforwardMode, IdentificationInput,
-    IdentificationOptions, RefinementScope,
+    AxisIdentification, AxisRecordings, Breakaway, ConditionedRecording, FeedforwardMode,
+    IdentificationInput, IdentificationOptions, RefinementScope,
 };
 use virtual_axes_identify::recording::{Conditioning, Finding, PsecShift, RawRecording};
 use virtual_axes_io::files::{Columns, RecordingOptions, read_recording};
@@ -83,10 +83,11 @@ impl GivenRecording<'_> {
                 "current" => raw.current = Some(values),
                 "velocity_feedforward" => raw.velocity_feedforward = Some(values),
                 "torque_feedforward" => raw.torque_feedforward = Some(values),
+                "motor_position" => raw.motor_position = Some(values),
                 other => {
                     return Err(value_error(format!(
                         "channel {other:?} is unknown; known are time, psec, position, velocity, current, \
-                         velocity_feedforward, torque_feedforward"
+                         velocity_feedforward, torque_feedforward, motor_position"
                     )));
                 }
             }
@@ -173,6 +174,18 @@ impl IdentifyOptions {
     }
 }
 
+/// Reads a recording of an axis, unless it was given by its channels.
+fn raw(
+    source: &Source,
+    axis: &AxisConfig,
+    reading: &RecordingOptions,
+) -> PyResult<(RawRecording, Vec<Finding>)> {
+    match source {
+        Source::File(path) => read_recording(path, axis, reading).map_err(value_error),
+        Source::Raw(raw) => Ok((raw.clone(), Vec::new())),
+    }
+}
+
 /// Reads and conditions recordings of an axis.
 fn conditioned(
     sources: &[Source],
@@ -182,17 +195,8 @@ fn conditioned(
 ) -> PyResult<Vec<ConditionedRecording>> {
     let mut found = Vec::new();
     for (source, mode) in sources.iter().zip(modes) {
-        let of_file = |path: &Path| read_recording(path, axis, reading).map_err(value_error);
-        let (raw, findings) = match source {
-            Source::File(path) => &of_file(path)?,
-            Source::Raw(raw) => &(raw.clone(), Vec::new()),
-        };
-        let one = ConditionedRecording::new(
-            (raw, findings.clone()),
-            (axis, periods),
-            conditioning,
-            (*mode, option),
-        );
+        let (raw, findings) = raw(source, axis, reading)?;
+        let one = ConditionedRecording::new((&raw, findings), (axis, periods), conditioning, (*mode, option));
         found.push(one.map_err(value_error)?);
     }
     Ok(found)
@@ -207,12 +211,13 @@ pub struct PyIdentification {
 
 /// Identifies an axis of a machine from recordings.
 #[pyfunction]
-#[pyo3(signature = (machine, axis, recordings, validations, options))]
+#[pyo3(signature = (machine, axis, recordings, transmissions, validations, options))]
 pub fn identify(
     py: Python<'_>,
     machine: PyRef<'_, PyMachine>,
     axis: &str,
     recordings: Vec<GivenRecording<'_>>,
+    transmissions: Vec<GivenRecording<'_>>,
     validations: Vec<GivenRecording<'_>>,
     options: IdentifyOptions,
 ) -> PyResult<PyIdentification> {
@@ -221,9 +226,9 @@ pub fn identify(
     let sources = |given: &[GivenRecording<'_>]| -> PyResult<Vec<Source>> {
         given.iter().enumerate().map(|(index, one)| one.source(index + 1)).collect()
     };
-    let (files, others) = (sources(&recordings)?, sources(&validations)?);
-    if files.is_empty() {
-        return Err(value_error("recordings: are empty; give at least one"));
+    let (files, both, others) = (sources(&recordings)?, sources(&transmissions)?, sources(&validations)?);
+    if files.is_empty() && both.is_empty() {
+        return Err(value_error("recordings: are empty; give at least one, or one for the transmission"));
     }
     let of_files = modes(&options.feedforward, files.len(), "feedforward")?;
     let for_others = match (options.validate_feedforward.as_slice(), options.feedforward.as_slice()) {
@@ -242,8 +247,13 @@ pub fn identify(
         let recordings = conditioned(&files, axis, reading, (&of_files, "feedforward"))?;
         let others = conditioned(&others, axis, reading, (&of_others, "validate_feedforward"))?;
         let start = |_: &str| check_stopped(&stopped);
-        AxisIdentification::new((&machine.parameters, index), recordings, others, &chosen, start)
-            .map_err(value_error)
+        let transmission = both.iter().map(|source| {
+            ConditionedRecording::of_both_encoders(raw(source, axis.0, reading.0)?, axis, reading.1)
+                .map_err(value_error)
+        });
+        let transmission = transmission.collect::<PyResult<Vec<_>>>()?;
+        let recordings = AxisRecordings { identification: recordings, transmission, validation: others };
+        AxisIdentification::new((&machine.parameters, index), recordings, &chosen, start).map_err(value_error)
     })?;
     Ok(PyIdentification { found, periods })
 }

@@ -28,6 +28,6 @@
 
 pub mod fixtures;
 pub mod presliding_study;
-pub mod transmission_study;
 pub mod production_traces;
 pub mod stress;
+pub mod transmission_study;

@@ -96,13 +96,8 @@ fn hidden(random: &mut RandomSource) -> Hidden {
     let has_gap = random.chance(0.5);
     let backlash = if has_gap { unit * log_between(random, 2.0, 60.0) } else { 0.0 };
     let load_friction = if random.chance(0.5) { random.unit() } else { 0.0 };
-    let truth = random.chance(0.85).then_some(TrueTransmission {
-        antiresonance,
-        load,
-        stiffness,
-        damping,
-        backlash,
-    });
+    let truth =
+        random.chance(0.85).then_some(TrueTransmission { antiresonance, load, stiffness, damping, backlash });
     if truth.is_some() {
         let (keys, per_unit, width) = match is_linear {
             true => (
@@ -289,7 +284,11 @@ impl fmt::Display for TransmissionStudy {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let elastic = || self.cases.iter().filter_map(|case| case.truth.map(|truth| (case, truth)));
         writeln!(f, "{:44} {:>7}", "elastic axes", elastic().count())?;
-        writeln!(f, "{:44} {:>7} {:>7} {:>7} {:>7} {:>9}", "", "number", "median", "90 %", "largest", "coverage")?;
+        writeln!(
+            f,
+            "{:44} {:>7} {:>7} {:>7} {:>7} {:>9}",
+            "", "number", "median", "90 %", "largest", "coverage"
+        )?;
         for (name, of, value) in QUANTITIES {
             let found: Vec<(f64, Interval)> = elastic()
                 .filter_map(|(case, truth)| Some((of(&truth), case.found.as_ref().and_then(value)?)))
@@ -315,7 +314,8 @@ impl fmt::Display for TransmissionStudy {
         let wrong = bounds().filter(|(truth, bound)| truth.backlash > *bound).count();
         writeln!(f, "{:44} {wrong:>7}", "– below the true one")?;
         let gaps = || elastic().filter(|(_, truth)| truth.backlash == 0.0);
-        let false_gaps = gaps().filter(|(c, _)| c.found.as_ref().is_some_and(|f| f.backlash.is_some())).count();
+        let false_gaps =
+            gaps().filter(|(c, _)| c.found.as_ref().is_some_and(|f| f.backlash.is_some())).count();
         writeln!(f, "{:44} {:>7}", "elastic axes without backlash", gaps().count())?;
         writeln!(f, "{:44} {false_gaps:>7}", "– with an identified backlash")?;
         let rigid = || self.cases.iter().filter(|case| case.truth.is_none());

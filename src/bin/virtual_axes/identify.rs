@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use virtual_axes_core::config::{DEFAULT_MACHINE, MachineConfig, Parameters, Periods};
 use virtual_axes_identify::identify::summary::IdentificationSummary;
 use virtual_axes_identify::identify::{
-    AxisIdentification, AxisValidation, Breakaway, ConditionedRecording, IdentificationInput,
+    AxisIdentification, AxisRecordings, AxisValidation, Breakaway, ConditionedRecording, IdentificationInput,
     IdentificationOptions, IdentifiedValue, RefinementScope,
 };
 use virtual_axes_identify::recording::{Finding, Severity};
@@ -43,7 +43,7 @@ enum RefinedGroup {
 pub struct IdentifyArguments {
     /// Recordings of the axis: CSV, or MCAP with DriveStates or JointState messages; for a campaign one for
     /// each feedforward mode.
-    #[arg(value_name = "RECORDING", required = true)]
+    #[arg(value_name = "RECORDING", required_unless_present = "transmission")]
     recordings: Vec<PathBuf>,
     /// Recorded axis, or `all`; without it the columns of the recordings are listed.
     #[arg(long)]
@@ -73,6 +73,10 @@ pub struct IdentifyArguments {
     /// --current-lag-ms, 0 by default.
     #[arg(long)]
     presliding: bool,
+    /// Recording with the encoders of motor and load (channels position and motor_position), to identify stiffness,
+    /// damping, inertia of the load and backlash of the transmission; can be repeated.
+    #[arg(long, value_name = "RECORDING")]
+    transmission: Vec<PathBuf>,
     /// Recording for validation of the identified axis; can be repeated.
     #[arg(long, value_name = "RECORDING")]
     validate: Vec<PathBuf>,
@@ -96,6 +100,13 @@ pub struct IdentifyArguments {
     output: OutputArguments,
 }
 
+impl IdentifyArguments {
+    /// Returns the recordings of the axis, without those for validation.
+    fn listed(&self) -> Vec<PathBuf> {
+        self.recordings.iter().chain(&self.transmission).cloned().collect()
+    }
+}
+
 /// Runs the command and returns tables or JSON.
 pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     check_outputs(arguments)?;
@@ -103,11 +114,11 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     let parameters = variant::parameters(&machine, None, &arguments.set, &[])?;
     let config = variant::checked(&parameters, &machine, &arguments.machine)?;
     let Some(name) = &arguments.axis else {
-        return columns::listing(&arguments.recordings, &arguments.reading, &config, &arguments.machine);
+        return columns::listing(&arguments.listed(), &arguments.reading, &config, &arguments.machine);
     };
     let is_all = name == ALL;
     let indices = if is_all {
-        columns::recorded_axes(&arguments.recordings, &arguments.reading, &config)?
+        columns::recorded_axes(&arguments.listed(), &arguments.reading, &config)?
     } else {
         vec![axis::index(&config, name)?]
     };
@@ -190,7 +201,9 @@ fn check_outputs(arguments: &IdentifyArguments) -> Result<(), String> {
         report::check_name(page)?;
     }
     let read = || {
-        let recordings = arguments.recordings.iter().chain(&arguments.validate).map(PathBuf::as_path);
+        let recordings =
+            arguments.recordings.iter().chain(&arguments.transmission).chain(&arguments.validate);
+        let recordings = recordings.map(PathBuf::as_path);
         recordings.chain(arguments.reading.map()).chain([Path::new(&arguments.machine)])
     };
     for output in [&arguments.out, &arguments.report].into_iter().flatten() {
@@ -254,12 +267,18 @@ fn identify(
     let others =
         others.iter().zip(other_modes).map(|(path, mode)| read(path, mode, "--validate-feedforward"));
     let others: Vec<ConditionedRecording> = others.collect::<Result<_, _>>()?;
+    let both = arguments.transmission.iter().map(|path| {
+        spinner.set_activity(format!("reading {}", path.display()))?;
+        recordings::read_both_encoders(path, (axis, &periods), (&arguments.reading, &options))
+    });
+    let transmission: Vec<ConditionedRecording> = both.collect::<Result<_, _>>()?;
 
     let i0 = if arguments.free_i0 { Breakaway::Freed } else { Breakaway::Held };
     let options =
         IdentificationOptions { i0, refine: refined_groups(arguments), presliding: arguments.presliding };
     let start = |part: &str| spinner.set_activity(part);
-    Ok(AxisIdentification::new((parameters, index), recordings, others, &options, start)?)
+    let recordings = AxisRecordings { identification: recordings, transmission, validation: others };
+    Ok(AxisIdentification::new((parameters, index), recordings, &options, start)?)
 }
 
 /// Returns the machine file.
@@ -274,7 +293,8 @@ fn machine_text(
         arguments.machine,
     );
     for summary in found {
-        let recordings: Vec<&str> = summary.recordings.iter().map(|r| r.name.as_str()).collect();
+        let recordings = summary.recordings.iter().chain(&summary.transmission_recordings);
+        let recordings: Vec<&str> = recordings.map(|r| r.name.as_str()).collect();
         head.push_str(&format!(
             "\n{} was identified from {}; ± is the standard error.",
             summary.axis,

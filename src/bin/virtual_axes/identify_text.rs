@@ -4,8 +4,8 @@ use virtual_axes_core::text::escaped;
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_core::units::Rounded;
 use virtual_axes_identify::identify::summary::{
-    DelaySummary, FrictionSummary, GravitySummary, IdentificationSummary, InertiaSummary, LawSummary,
-    PartSummary, PreslidingSummary, RefinementSummary, ResidualSummary,
+    DelaySummary, FrictionSummary, GravitySummary, IdentificationSummary, InertiaSummary, IntervalSummary,
+    LawSummary, PartSummary, PreslidingSummary, RefinementSummary, ResidualSummary, TransmissionSummary,
 };
 use virtual_axes_identify::identify::{
     FeedforwardRegression, FrictionLaw, GravityCurrent, GravitySource, IdentifiedValue, ResidualStatistics,
@@ -141,6 +141,7 @@ fn steps(found: &IdentificationSummary) -> Vec<String> {
         found.gravity.as_ref().map(gravity),
         found.inertia.as_ref().map(inertia),
         found.presliding.as_ref().map(presliding),
+        found.transmission.as_ref().map(|fit| transmission(fit, table::scale(found.kind).0)),
         found.feedforward.velocity.as_ref().map(|fit| regression("VFFW", fit)),
         found.feedforward.torque.as_ref().map(|fit| regression("TFFW", fit)),
     ];
@@ -273,6 +274,29 @@ fn presliding(found: &PreslidingSummary) -> String {
         found.stiffness_unit,
         found.reversals
     )
+}
+
+fn transmission(found: &TransmissionSummary, length: &str) -> String {
+    let interval = |found: &IntervalSummary| {
+        let [low, high] = found.interval.map(|bound| digits(bound, 3));
+        format!("{} ({low} … {high})", digits(found.value, 4))
+    };
+    let mut text = format!("transmission: antiresonance {} Hz", interval(&found.antiresonance_hz));
+    let named = [
+        ("stiffness", &found.stiffness, found.stiffness_unit),
+        ("load", &found.load_inertia, found.inertia_unit),
+        ("motor and load", &found.total_inertia, found.inertia_unit),
+        ("backlash", &found.backlash, length),
+    ];
+    for (name, value, unit) in named {
+        if let Some(value) = value {
+            text.push_str(&format!("; {name} {} {unit}", interval(value)));
+        }
+    }
+    if let Some(bound) = found.excluded_backlash {
+        text.push_str(&format!("; no backlash above {} {length}", digits(bound, 2)));
+    }
+    text + &format!("; R² of the acceleration {:.4}", found.r_squared)
 }
 
 fn inertia(inertia: &InertiaSummary) -> String {

@@ -15,8 +15,8 @@ use crate::campaign::FeedforwardName;
 #[derive(Debug, Clone, clap::Args)]
 pub struct RecordingArguments {
     /// Column and unit of a channel in CSV files, for example `position=Pos1[mm]`, `current=#4[-1 A]`.
-    /// Channels: time, psec, position, velocity, current, velocity_feedforward, torque_feedforward; also
-    /// `delimiter=;`, `decimal_comma=true`, `skip_lines=2`; can be repeated.
+    /// Channels: time, psec, position, velocity, current, velocity_feedforward, torque_feedforward, motor_position,
+    /// wind_up; also `delimiter=;`, `decimal_comma=true`, `skip_lines=2`; can be repeated.
     #[arg(long, value_name = "CHANNEL=COLUMN[UNIT]")]
     column: Vec<String>,
     /// File with column mappings; --column has priority.
@@ -110,6 +110,20 @@ pub fn read(
     let (raw, findings) = read_recording(path, axis, options)?;
     let conditioning = reading.conditioning();
     Ok(ConditionedRecording::new((&raw, findings), (axis, periods), &conditioning, (feedforward, option))?)
+}
+
+/// Reads and conditions the recording `path` of `axis` with both encoders.
+///
+/// # Errors
+///
+/// Returns an error if the file is invalid.
+pub fn read_both_encoders(
+    path: &Path,
+    axis: (&AxisConfig, &Periods),
+    (reading, options): (&RecordingArguments, &RecordingOptions),
+) -> Result<ConditionedRecording, Box<dyn Error>> {
+    let read = read_recording(path, axis.0, options)?;
+    Ok(ConditionedRecording::of_both_encoders(read, axis, &reading.conditioning())?)
 }
 
 /// Returns the active feedforward of each of `count` recordings from the values of `option`: one for all, or

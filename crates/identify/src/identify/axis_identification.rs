@@ -11,7 +11,8 @@ use virtual_axes_core::units::{MILLISECOND, MILLISECOND_NS};
 use super::summary::IdentificationSummary;
 use super::{
     Agreement, FeedforwardMode, Identification, IdentificationInput, IdentificationOptions, IdentifiedValue,
-    are_production_traces, constant_lag, identify, invalid_agreement, update_parameters, validate,
+    are_production_traces, constant_lag, identify_with_transmission, invalid_agreement, update_parameters,
+    validate,
 };
 use crate::recording::{Conditioning, ConditioningError, Finding, RawRecording, Signals, condition};
 
@@ -118,6 +119,25 @@ impl ConditionedRecording {
         Ok(ConditionedRecording { signals, feedforward, findings })
     }
 
+    /// Conditions the recording `raw` of `axis` with both encoders, which was read with `findings`, without its setpoints.
+    /// The lag of the current is that of the options, 0 by default.
+    ///
+    /// # Errors
+    /// [`AxisIdentificationError`] if the recording is not plausible.
+    pub fn of_both_encoders(
+        (raw, mut findings): (RawRecording, Vec<Finding>),
+        (axis, periods): (&AxisConfig, &Periods),
+        conditioning: &Conditioning,
+    ) -> Result<Self, AxisIdentificationError> {
+        // An elastic axis lags behind its setpoints in another way than a rigid one.
+        let raw = RawRecording { psec: None, velocity_feedforward: None, torque_feedforward: None, ..raw };
+        let current_lag = conditioning.current_lag.or(Some(0.0));
+        let conditioning = Conditioning { current_lag, ..*conditioning };
+        let (signals, more) = condition(&raw, axis, periods, &conditioning)?;
+        findings.extend(more);
+        Ok(ConditionedRecording { signals, feedforward: None, findings })
+    }
+
     /// Converts the recording to the input of the identification.
     pub fn input(&self) -> IdentificationInput<'_> {
         IdentificationInput { signals: &self.signals, feedforward: self.feedforward }
@@ -145,6 +165,17 @@ pub struct AxisValidation {
     pub agreement: Agreement,
 }
 
+/// Recordings of an axis by their use.
+#[derive(Debug, Default)]
+pub struct AxisRecordings {
+    /// Recordings for the parameters of the rigid axis.
+    pub identification: Vec<ConditionedRecording>,
+    /// Recordings with both encoders, for the elastic transmission.
+    pub transmission: Vec<ConditionedRecording>,
+    /// Recordings to compare the identified axis with.
+    pub validation: Vec<ConditionedRecording>,
+}
+
 /// Identification of an axis with its validation and summary.
 #[derive(Debug)]
 pub struct AxisIdentification {
@@ -152,6 +183,8 @@ pub struct AxisIdentification {
     pub recordings: Vec<ConditionedRecording>,
     /// Result of the identification.
     pub identification: Identification,
+    /// Recordings with both encoders.
+    pub transmissions: Vec<ConditionedRecording>,
     /// Validation results.
     pub validations: Vec<AxisValidation>,
     /// Figures of the output.
@@ -161,25 +194,28 @@ pub struct AxisIdentification {
 }
 
 impl AxisIdentification {
-    /// Identifies the axis `index` of the machine `parameters` from `recordings` and compares it with the recordings
-    /// `others`. `start` is called with the name of each part before it starts.
+    /// Identifies the axis `index` of the machine `parameters` and compares it with the recordings for the validation.
+    /// `start` is called with the name of each part before it starts.
     ///
     /// # Errors
     /// [`AxisIdentificationError`] if no parameter is determined, or of `start`.
     pub fn new(
         (parameters, index): (&Parameters, usize),
-        recordings: Vec<ConditionedRecording>,
-        others: Vec<ConditionedRecording>,
+        recordings: AxisRecordings,
         options: &IdentificationOptions,
         start: impl Fn(&str) -> io::Result<()>,
     ) -> Result<Self, AxisIdentificationError> {
+        let AxisRecordings { identification: recordings, transmission: transmissions, validation: others } =
+            recordings;
         let config = parameters.machine_config()?;
         let (axis, periods) = (&config.axes()[index], config.periods());
         start(&format!("identifying {}", axis.name()))?;
         let inputs: Vec<IdentificationInput<'_>> =
             recordings.iter().map(ConditionedRecording::input).collect();
-        let identification = identify(&inputs, axis, &periods, options);
-        let of_files = recordings.iter().chain(&others).flat_map(|recorded| &recorded.findings);
+        let both: Vec<&Signals> = transmissions.iter().map(|recorded| &recorded.signals).collect();
+        let identification = identify_with_transmission(&inputs, &both, axis, &periods, options);
+        let of_files =
+            recordings.iter().chain(&transmissions).chain(&others).flat_map(|recorded| &recorded.findings);
         // The same file can be given twice.
         let mut findings: Vec<Finding> = Vec::new();
         for finding in of_files.chain(&identification.findings) {
@@ -218,9 +254,15 @@ impl AxisIdentification {
         findings.sort_by_key(|finding| Reverse(finding.severity));
         let validated: Vec<(IdentificationInput<'_>, &Agreement)> =
             validations.iter().map(|v| (v.recorded.input(), &v.agreement)).collect();
-        let summary =
-            IdentificationSummary::new(config.name(), &inputs, &identification, values, &validated, findings);
-        Ok(AxisIdentification { recordings, identification, validations, summary, identified })
+        let summary = IdentificationSummary::new(
+            config.name(),
+            (&inputs, &both),
+            &identification,
+            values,
+            &validated,
+            findings,
+        );
+        Ok(AxisIdentification { recordings, identification, transmissions, validations, summary, identified })
     }
 }
 

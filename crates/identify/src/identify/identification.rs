@@ -7,8 +7,8 @@ use super::friction::FrictionFit;
 use super::gravity::{GravityFit, SteadyMeasurements};
 use super::inertia::InertiaFit;
 use super::presliding::PreslidingFit;
-use super::refine::Refinement;
-use super::transmission::TransmissionFit;
+use super::refine::{RefinedParameter, Refinement};
+use super::transmission::{Interval, TransmissionFit};
 use super::validate::Agreement;
 use crate::recording::Finding;
 use virtual_axes_core::config::{AxisConfig, Periods};
@@ -57,6 +57,14 @@ pub struct Identification {
 }
 
 impl Identification {
+    /// Returns the inertia of motor and load, kg or kg·m² at the axis, if the recordings with both encoders tell it and the
+    /// others do not.
+    pub(super) fn inertia_of_both_encoders(&self) -> Option<Interval> {
+        let is_known = self.inertia.is_some() || self.refined(RefinedParameter::Inertia).is_some();
+        let masses = self.transmission.as_ref()?.masses.as_ref()?;
+        (!is_known).then_some(masses.total)
+    }
+
     /// Returns the identified axis parameters.
     pub fn axis(&self) -> &AxisConfig {
         &self.axis

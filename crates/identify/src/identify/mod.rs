@@ -41,7 +41,7 @@ mod validate;
 mod values;
 
 pub use axis_identification::{
-    AxisIdentification, AxisIdentificationError, AxisValidation, ConditionedRecording,
+    AxisIdentification, AxisIdentificationError, AxisRecordings, AxisValidation, ConditionedRecording,
 };
 pub use closed_loop::{Experiment, SimulatedExperiment, find_experiments, simulate, simulate_all};
 pub use delays::{DelayFit, DelayParameter};

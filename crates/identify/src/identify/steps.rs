@@ -15,8 +15,8 @@ use super::presliding::fit_presliding;
 use super::production::{are_production_traces, identify_production};
 use super::refine::RefinedParameter;
 use super::sanity::report_invalid;
-use super::transmission::fit_transmission;
 use super::segments::{MotionSegment, SegmentKind, find_segments};
+use super::transmission::fit_transmission;
 use super::validate::compute_agreement;
 use crate::recording::{Finding, Signals};
 use virtual_axes_core::config::{AxisConfig, DeviationConfig, Periods};
@@ -204,8 +204,8 @@ impl<'a> IdentificationSteps<'a> {
         found.transmission = fit_transmission(recordings, &found.axis, &mut found.findings);
         let Some(fit) = &found.transmission else { return };
         fit.apply(&mut found.axis);
-        if let (true, Some(masses)) = (self.inputs.is_empty(), &fit.masses) {
-            found.axis.motor.inertia = masses.total.value * found.axis.transmission_ratio.powi(2);
+        if let Some(total) = found.inertia_of_both_encoders() {
+            found.axis.motor.inertia = total.value * found.axis.transmission_ratio.powi(2);
         }
     }
 

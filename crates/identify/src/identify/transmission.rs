@@ -24,7 +24,7 @@ use self::motion::TwoEncoderMotion;
 use super::presliding::student;
 use crate::recording::{Finding, Signals};
 use virtual_axes_core::config::{AxisConfig, AxisKind, TransmissionConfig};
-use virtual_axes_core::units::{MILLISECOND, NEWTON_PER_MICROMETER, Rounded};
+use virtual_axes_core::units::{MICROMETER, MILLISECOND, Rounded};
 
 /// Smallest spread of the twist in standard deviations by the encoders.
 const NOISE: f64 = 5.0;
@@ -220,7 +220,7 @@ impl TransmissionSearch<'_> {
     /// Returns the finding about a twist that the encoders do not resolve.
     fn too_stiff(&self, fit: &ContactFit, antiresonance: Interval) -> Finding {
         let (unit, name) = match self.axis.kind() {
-            AxisKind::Linear => (1e-6, "µm"),
+            AxisKind::Linear => (MICROMETER, "µm"),
             AxisKind::Rotary => (1.0, "rad"),
         };
         let what = format!(
@@ -309,13 +309,5 @@ impl TransmissionSearch<'_> {
             stiffness,
             damping: Some(damping).filter(|damping| damping.bounds[0] > 0.0),
         })
-    }
-}
-
-/// Returns the symbol of a stiffness at the axis, and its factor to SI.
-pub(super) fn stiffness_unit(kind: AxisKind) -> (&'static str, f64) {
-    match kind {
-        AxisKind::Linear => ("N/um", NEWTON_PER_MICROMETER),
-        AxisKind::Rotary => ("N.m/rad", 1.0),
     }
 }

@@ -3,7 +3,8 @@
 use super::SignalSpan;
 use super::filter::{FilteredSignal, GaussianFilter};
 use super::spans::{
-    CURRENT, MOTOR_POSITION, POSITION, PSEC, RecordingSection, TORQUE_FEEDFORWARD, VELOCITY, VELOCITY_FEEDFORWARD,
+    CURRENT, MOTOR_POSITION, POSITION, PSEC, RecordingSection, TORQUE_FEEDFORWARD, VELOCITY,
+    VELOCITY_FEEDFORWARD,
 };
 
 /// Section of a recording after filtering.

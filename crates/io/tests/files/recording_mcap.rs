@@ -160,6 +160,7 @@ fn a_written_trace_is_read_back() {
         current: 0.3 * v,
         velocity_feedforward: 0.4 * v,
         torque_feedforward: 0.5 * v,
+        wind_up: 0.25 * v,
         effort: 99.0,
         ..AxisSample::default()
     };
@@ -183,6 +184,7 @@ fn a_written_trace_is_read_back() {
         current: scaled(0.3),
         velocity_feedforward: scaled(0.4),
         torque_feedforward: scaled(0.5),
+        motor_position: Some((0..5).map(|k| 0.1 * f64::from(k) + 0.25 * f64::from(k)).collect()),
     };
     assert_eq!(found, wanted);
     let columns = Columns::read(None, &["position=p"], "--column").expect("a mapping");

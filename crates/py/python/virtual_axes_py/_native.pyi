@@ -77,6 +77,7 @@ def identify(
     machine: Machine,
     axis: str,
     recordings: Sequence[str | dict[str, Any]],
+    transmissions: Sequence[str | dict[str, Any]],
     validations: Sequence[str | dict[str, Any]],
     options: dict[str, Any],
 ) -> Identification: ...

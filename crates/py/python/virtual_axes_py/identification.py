@@ -76,6 +76,7 @@ def identify(
     axis: str,
     machine: Machine | None = None,
     *,
+    transmission: Recording | Sequence[Recording] = (),
     validate: Recording | Sequence[Recording] = (),
     feedforward: Feedforward | Sequence[Feedforward] = (),
     validate_feedforward: Feedforward | Sequence[Feedforward] = (),
@@ -97,10 +98,11 @@ def identify(
 
     `recordings` are files (CSV, MCAP, exports of controls) or dictionaries of equally long channels: `time` (s),
     `position` and `psec` (m or rad), `velocity` (m/s or rad/s of the axis), `current` (A), `velocity_feedforward`
-    (rad/s of the motor) and `torque_feedforward` (N·m). `machine` (default: the first built-in one) has the initial
+    (rad/s of the motor), `torque_feedforward` (N·m) and `motor_position` (m or rad at the axis). `machine` (default: the first built-in one) has the initial
     values.
 
-    The options are those of the command: `validate` are recordings to compare with the result; `feedforward` is the
+    The options are those of the command: `transmission` are recordings with the encoders of motor and load, to identify
+    stiffness, damping, inertia of the load and backlash, beside `recordings` or alone with `[]`; `validate` are recordings to compare with the result; `feedforward` is the
     active one, `off`, `velocity` or `both`, for all or for each recording; `refine` are the groups that the refinement
     in closed loop adjusts (`inertia`, `friction`, `gravity`, `feedforward`, `gain`; by default all, `()` for none);
     `free_i0` refines the breakaway current by itself; `presliding` identifies stiffness and damping of the presliding
@@ -131,7 +133,8 @@ def identify(
         "presliding": presliding,
     }
     native = to_native(machine if machine is not None else Machine.load())
-    return Identification(_native.identify(native, axis, _sources(recordings), _sources(validate), options))
+    given = [_sources(recordings), _sources(transmission), _sources(validate)]
+    return Identification(_native.identify(native, axis, *given, options))
 
 
 def _sources(given: Recording | Sequence[Recording]) -> list[str | dict[str, Any]]:

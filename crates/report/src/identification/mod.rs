@@ -12,6 +12,7 @@ mod presliding;
 mod recordings;
 mod refinement;
 mod summary;
+mod transmission;
 
 use virtual_axes_core::config::{AxisConfig, AxisKind, Periods};
 use virtual_axes_core::units::seconds;
@@ -62,6 +63,7 @@ impl IdentificationPage<'_> {
             inertia::section(self),
         ];
         sections.extend(presliding::section(self));
+        sections.extend(transmission::section(self));
         sections.extend([
             feedforward::section(self),
             delays::section(self),

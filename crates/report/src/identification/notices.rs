@@ -11,6 +11,7 @@ pub(super) enum Step {
     Friction,
     Inertia,
     Presliding,
+    Transmission,
     Feedforward,
     Delays,
     Refinement,
@@ -27,6 +28,7 @@ impl Step {
                 &[Step::Friction]
             }
             "presliding-damping" => &[Step::Presliding],
+            "one-encoder" | "no-wind-up" | "one-flank" | "no-load-inertia" => &[Step::Transmission],
             "saturated-current" | "no-acceleration" | "negative-inertia" | "unseen-current" => {
                 &[Step::Inertia]
             }

@@ -93,7 +93,7 @@ impl TestCase {
         let validated: Vec<_> = validations.iter().map(|check| (check.input, check.agreement)).collect();
         let summary = IdentificationSummary::new(
             self.machine.name(),
-            &inputs,
+            (&inputs, &[]),
             identification,
             values.to_vec(),
             &validated,

@@ -15,11 +15,11 @@ use super::options::IdentificationInput;
 use super::segments::SegmentKind;
 use super::validate::{Agreement, ExperimentComparison, ResidualStatistics};
 use super::values::IdentifiedValue;
-use crate::recording::Finding;
+use crate::recording::{Finding, Signals};
 pub use steps::{
     Change, DelaySummary, DirectionsSummary, Estimate, FrictionSummary, GravitySummary, InertiaSummary,
-    LawCoefficients, LawSummary, LevelSummary, LineSummary, PreslidingSummary, RefinementSummary,
-    RestSummary, SpeedSummary,
+    IntervalSummary, LawCoefficients, LawSummary, LevelSummary, LineSummary, PreslidingSummary,
+    RefinementSummary, RestSummary, SpeedSummary, TransmissionSummary,
 };
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::units::{DEGREE, MILLIMETER, MILLISECOND};
@@ -50,6 +50,10 @@ pub struct IdentificationSummary {
     pub inertia: Option<InertiaSummary>,
     /// Presliding; none if it was not identified.
     pub presliding: Option<PreslidingSummary>,
+    /// Elastic transmission; none without recordings of both encoders.
+    pub transmission: Option<TransmissionSummary>,
+    /// Recordings with both encoders.
+    pub transmission_recordings: Vec<RecordingSummary>,
     /// Gravity.
     pub gravity: Option<GravitySummary>,
     /// Regressions of the feedforward weights.
@@ -69,11 +73,11 @@ pub struct IdentificationSummary {
 impl IdentificationSummary {
     /// Summarizes an identification.
     ///
-    /// `recordings` are the inputs of the identification, `values` its [values](Identification::values),
+    /// `recordings` are the inputs of the identification, those for the rigid axis and those with both encoders, `values` its [values](Identification::values),
     /// `validations` the other recordings with their agreement, `findings` all findings in the order of output.
     pub fn new(
         machine: &str,
-        recordings: &[IdentificationInput<'_>],
+        (recordings, both_encoders): (&[IdentificationInput<'_>], &[&Signals]),
         identification: &Identification,
         values: Vec<IdentifiedValue>,
         validations: &[(IdentificationInput<'_>, &Agreement)],
@@ -107,6 +111,13 @@ impl IdentificationSummary {
                 .map(|friction| FrictionSummary::new(friction, &found.steady.levels, speed_unit(axis))),
             inertia: InertiaSummary::new(found),
             presliding: found.presliding.as_ref().map(|fit| PreslidingSummary::new(fit, kind)),
+            transmission: found.transmission.as_ref().map(|fit| TransmissionSummary::new(fit, kind)),
+            transmission_recordings: both_encoders
+                .iter()
+                .map(|signals| {
+                    RecordingSummary::new(&IdentificationInput { signals, feedforward: None }, None)
+                })
+                .collect(),
             gravity: found.gravity.as_ref().map(GravitySummary::new),
             feedforward: found.feedforward.clone(),
             delays: found.delays.iter().map(|fit| DelaySummary::new(fit, position)).collect(),

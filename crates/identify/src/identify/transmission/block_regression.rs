@@ -80,14 +80,11 @@ impl BlockRegression {
 
     /// Returns the value of a function of the coefficients of the first `count` columns, and the values without each of the
     /// blocks.
-    pub fn jackknife<T>(
-        &self,
-        count: usize,
-        of: impl Fn(&DVector<f64>) -> T,
-    ) -> Option<(T, Vec<T>)> {
+    pub fn jackknife<T>(&self, count: usize, of: impl Fn(&DVector<f64>) -> T) -> Option<(T, Vec<T>)> {
         let all = of(&self.solve(count, None)?);
-        let without: Option<Vec<T>> =
-            (0..self.blocks.len()).map(|k| self.solve(count, Some(k)).map(|solution| of(&solution))).collect();
+        let without: Option<Vec<T>> = (0..self.blocks.len())
+            .map(|k| self.solve(count, Some(k)).map(|solution| of(&solution)))
+            .collect();
         Some((all, without?))
     }
 }

@@ -298,6 +298,10 @@ struct Entries {
     #[serde(deserialize_with = "non_empty_value")]
     torque_feedforward: Option<Scalar>,
     #[serde(deserialize_with = "non_empty_value")]
+    motor_position: Option<Scalar>,
+    #[serde(deserialize_with = "non_empty_value")]
+    wind_up: Option<Scalar>,
+    #[serde(deserialize_with = "non_empty_value")]
     delimiter: Option<Scalar>,
     #[serde(deserialize_with = "non_empty_value")]
     decimal_comma: Option<Scalar>,
@@ -315,6 +319,8 @@ impl Entries {
             self.current,
             self.velocity_feedforward,
             self.torque_feedforward,
+            self.motor_position,
+            self.wind_up,
             self.delimiter,
             self.decimal_comma,
             self.skip_lines,

@@ -7,6 +7,7 @@ use mcap::McapError;
 
 use super::error::AxisRecordingError;
 use super::join::{TargetStamps, TimeSource};
+use super::recording_builder::motor_position;
 use super::series::{MessageKind, Row, Series};
 use crate::files::mcap_reader::{Completeness, check_chunks, parse_error, read_messages, type_of};
 use crate::files::shorten_names;
@@ -235,6 +236,9 @@ fn base_recording(
         recording.psec = channel(rows, MessageKind::PSEC);
         recording.velocity_feedforward = channel(rows, MessageKind::VELOCITY_FEEDFORWARD);
         recording.torque_feedforward = channel(rows, MessageKind::TORQUE_FEEDFORWARD);
+        let wind_up = channel(rows, MessageKind::WIND_UP);
+        let both = recording.position.as_ref().zip(wind_up);
+        recording.motor_position = both.and_then(|(load, wind_up)| motor_position(load, &wind_up));
     }
     if recording.position.is_none() {
         let (channel, rows) = (super::Channel::Position, rows.len());

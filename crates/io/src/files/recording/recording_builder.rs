@@ -23,6 +23,7 @@ pub(super) fn build_recording(
     let name = context.name;
     assignment.report(context, found, findings);
     let mut recording = RawRecording { name: name.to_owned(), ..RawRecording::default() };
+    let mut wind_up = None;
     for (index, (channel, values)) in Channel::ALL.into_iter().zip(channels).enumerate() {
         let Some(column) = assignment.column_of(index) else { continue };
         if values.iter().all(|value| value.is_nan()) {
@@ -42,10 +43,20 @@ pub(super) fn build_recording(
             Channel::Current => recording.current = Some(values),
             Channel::VelocityFeedforward => recording.velocity_feedforward = Some(values),
             Channel::TorqueFeedforward => recording.torque_feedforward = Some(values),
+            Channel::MotorPosition => recording.motor_position = Some(values),
+            Channel::WindUp => wind_up = Some(values),
         }
     }
+    recording.motor_position =
+        recording.motor_position.or_else(|| motor_position(recording.position.as_ref()?, &wind_up?));
     set_time(context, assignment, found, rows, findings, &mut recording);
     Ok(recording)
+}
+
+/// Returns the position of the motor at the axis from that of the load and the wind-up, m or rad.
+pub(super) fn motor_position(load: &[f64], wind_up: &[f64]) -> Option<Vec<f64>> {
+    let sum: Vec<f64> = load.iter().zip(wind_up).map(|(load, wind_up)| load + wind_up).collect();
+    sum.iter().any(|position| position.is_finite()).then_some(sum)
 }
 
 /// Computes the time from the sample number or the index of the row; reports a sampling rate that is not used.

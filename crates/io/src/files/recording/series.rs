@@ -7,10 +7,10 @@ use serde::Deserialize;
 
 use super::error::AxisRecordingError;
 use crate::files::mcap_reader::decode;
-use crate::messages::MotorCurrents;
 use crate::messages::builtin_interfaces::msg::Time;
 use crate::messages::sensor_msgs::msg::JointState;
 use crate::messages::std_msgs::msg::Header;
+use crate::messages::{DriveStates, MotorCurrents};
 use virtual_axes_core::text::{nearest_name, shortened};
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS, seconds};
 
@@ -41,6 +41,8 @@ impl MessageKind {
     pub const VELOCITY_FEEDFORWARD: usize = 3;
     /// Index of the torque feedforward in a row of drive states.
     pub const TORQUE_FEEDFORWARD: usize = 4;
+    /// Index of the wind-up in a row of drive states; NaN in recordings of versions without it.
+    pub const WIND_UP: usize = 5;
     /// Index of the current in a row of motor currents.
     pub const CURRENT: usize = 0;
 
@@ -72,6 +74,8 @@ impl MessageKind {
                 Decoded { stamp: m.header.stamp, names: m.name, fields: vec![("current", m.current)] }
             }
             MessageKind::DriveStates => {
+                // Recordings of earlier versions have no wind-up.
+                let wind_up = decode::<DriveStates>(message).map(|m| m.wind_up).unwrap_or_default();
                 let m: RecordedDriveStates = decode(message)?;
                 let fields = vec![
                     ("position", m.position),
@@ -79,6 +83,7 @@ impl MessageKind {
                     ("psec", m.psec),
                     ("velocity_feedforward", m.velocity_feedforward),
                     ("torque_feedforward", m.torque_feedforward),
+                    ("wind_up", wind_up),
                 ];
                 Decoded { stamp: m.header.stamp, names: m.name, fields }
             }
@@ -86,7 +91,7 @@ impl MessageKind {
     }
 }
 
-/// Fields of `virtual_axes/msg/DriveStates` up to the last one that is read; later fields depend on the version.
+/// Fields of `virtual_axes/msg/DriveStates` that recordings of all versions have.
 #[allow(dead_code, reason = "the fields in between take their place in a message")]
 #[derive(Deserialize)]
 struct RecordedDriveStates {
@@ -118,7 +123,7 @@ pub(super) struct Row {
     /// Field `header.stamp`, ns.
     pub stamp: Nanoseconds,
     /// Values at the indices of [`MessageKind`]; NaN if missing.
-    pub values: [f64; 5],
+    pub values: [f64; 6],
 }
 
 /// Messages of one type on one topic.
@@ -189,7 +194,7 @@ impl Series {
             if !is_match || names[..index].contains(found) {
                 continue;
             }
-            let mut row = Row { log_time, stamp, values: [f64::NAN; 5] };
+            let mut row = Row { log_time, stamp, values: [f64::NAN; 6] };
             for (value, (field, values)) in row.values.iter_mut().zip(&fields) {
                 let Some(found) = values.get(index) else { continue };
                 if found.is_infinite() {

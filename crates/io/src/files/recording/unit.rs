@@ -23,11 +23,15 @@ pub enum Channel {
     VelocityFeedforward,
     /// Torque feedforward (TFFWS).
     TorqueFeedforward,
+    /// Position of the motor at the axis, beside that of the load.
+    MotorPosition,
+    /// Position of the motor at the axis minus that of the load.
+    WindUp,
 }
 
 impl Channel {
     /// All channels. Only time and position are required.
-    pub const ALL: [Channel; 7] = [
+    pub const ALL: [Channel; 9] = [
         Channel::Time,
         Channel::Psec,
         Channel::Position,
@@ -35,6 +39,8 @@ impl Channel {
         Channel::Current,
         Channel::VelocityFeedforward,
         Channel::TorqueFeedforward,
+        Channel::MotorPosition,
+        Channel::WindUp,
     ];
 
     /// Returns the name in column mappings.
@@ -47,6 +53,8 @@ impl Channel {
             Channel::Current => "current",
             Channel::VelocityFeedforward => "velocity_feedforward",
             Channel::TorqueFeedforward => "torque_feedforward",
+            Channel::MotorPosition => "motor_position",
+            Channel::WindUp => "wind_up",
         }
     }
 
@@ -64,7 +72,9 @@ impl Channel {
     pub(super) const fn symbols(self) -> &'static [&'static str] {
         match self {
             Channel::Time => &["s", "ms", "us", "ns"],
-            Channel::Psec | Channel::Position => &["m", "mm", "um", "rad", "deg", "mdeg"],
+            Channel::Psec | Channel::Position | Channel::MotorPosition | Channel::WindUp => {
+                &["m", "mm", "um", "rad", "deg", "mdeg"]
+            }
             Channel::Velocity => &["m/s", "mm/s", "m/min", "mm/min", "rad/s", "deg/s", "deg/min", "rpm"],
             Channel::VelocityFeedforward => &["rad/s", "rpm", "m/s", "mm/s", "m/min", "mm/min"],
             Channel::Current => &["A", "mA", "N.m", "N"],
@@ -76,7 +86,7 @@ impl Channel {
     pub(super) const fn si_units(self) -> &'static str {
         match self {
             Channel::Time => "s",
-            Channel::Psec | Channel::Position => "m or rad",
+            Channel::Psec | Channel::Position | Channel::MotorPosition | Channel::WindUp => "m or rad",
             Channel::Velocity => "m/s or rad/s",
             Channel::Current => "A",
             Channel::VelocityFeedforward => "rad/s of the motor",
@@ -105,12 +115,10 @@ impl Channel {
         };
         match self {
             Channel::Time => vec![("s", 1.0), ("ms", MILLISECOND), ("us", MICRO), ("ns", NANO)],
-            Channel::Psec | Channel::Position if linear => {
-                vec![("m", 1.0), ("mm", MILLIMETER), ("um", MICRO)]
-            }
-            Channel::Psec | Channel::Position => {
-                vec![("rad", 1.0), ("deg", DEGREE), ("mdeg", DEGREE * MILLI)]
-            }
+            Channel::Psec | Channel::Position | Channel::MotorPosition | Channel::WindUp => match linear {
+                true => vec![("m", 1.0), ("mm", MILLIMETER), ("um", MICRO)],
+                false => vec![("rad", 1.0), ("deg", DEGREE), ("mdeg", DEGREE * MILLI)],
+            },
             Channel::Velocity => speeds(),
             Channel::Current => [CURRENTS.to_vec(), scaled(&torques, 1.0 / constant)].concat(),
             Channel::VelocityFeedforward if linear_motor => speeds(),
