@@ -51,7 +51,10 @@ pub fn text(found: &IdentificationSummary) -> String {
         text_table::aligned(&values(&found.values), &[0, 2, 5]),
     ];
     parts.extend(steps(found));
-    parts.push(text_table::text(&agreement(found)));
+    let agreement = agreement(found);
+    if !agreement.rows.is_empty() {
+        parts.push(text_table::text(&agreement));
+    }
     parts.push(baselines(found));
     let findings: Vec<String> = found.findings.iter().map(|f| text_table::wrapped_line(&f.line())).collect();
     parts.push(findings.concat());
@@ -98,7 +101,8 @@ fn recordings(found: &IdentificationSummary) -> Table {
         ("feedforward", ""),
     ]);
     let validations = found.validation.iter().map(|v| (validation_name(&v.recording.name), &v.recording));
-    let all = found.recordings.iter().map(|recording| (recording.name.clone(), recording));
+    let both = found.transmission_recordings.iter();
+    let all = found.recordings.iter().chain(both).map(|recording| (recording.name.clone(), recording));
     for (name, recording) in all.chain(validations) {
         table.rows.push(vec![
             name,

@@ -4,6 +4,7 @@ mod identify_campaign;
 mod identify_criterion;
 mod identify_findings;
 mod identify_presliding;
+mod identify_transmission;
 mod identify_recordings;
 mod identify_round_trip;
 mod recording_conditioning;

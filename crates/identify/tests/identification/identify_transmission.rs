@@ -1,0 +1,174 @@
+//! Transmission identified from the encoders of motor and load, and recordings that do not determine it.
+
+use std::f64::consts::TAU;
+
+use virtual_axes_core::config::{MachineConfig, Parameters, Value, ValueSource, parse_assignment};
+use virtual_axes_core::units::seconds;
+use virtual_axes_identify::identify::{
+    Identification, IdentificationOptions, identify_with_transmission, update_parameters,
+};
+use virtual_axes_identify::recording::{Conditioning, RawRecording, condition};
+use virtual_axes_verification::fixtures::recordings::{
+    CurrentNoise, Disturbance, axis_index, record, true_parameters,
+};
+use virtual_axes_verification::transmission_study::TransmissionStudy;
+
+/// Stiffness (N/µm), damping (N·s/m), load (kg) and backlash (µm) of X.
+const TRUTH: [f64; 4] = [150.0, 15000.0, 1300.0, 9.0];
+const KEYS: [&str; 4] = ["stiffness_n_um", "damping_n_s_m", "load_mass_kg", "backlash_um"];
+
+/// Returns a machine whose X has a transmission with `values`.
+fn elastic(values: [f64; 4]) -> MachineConfig {
+    let source = ValueSource::named("the test");
+    let texts = KEYS.iter().zip(values).map(|(key, value)| format!("x.transmission.{key}={value}"));
+    let friction = ["x.transmission.load_friction=0.5".to_owned()];
+    let assignments = texts.chain(friction).map(|text| parse_assignment(&text, &source).expect("good"));
+    let mut parameters = true_parameters();
+    parameters.set_all(assignments.collect()).expect("values in range");
+    parameters.machine_config().expect("a machine")
+}
+
+/// Returns setpoints of X: two slow reversals, and a chirp up to `highest` Hz about a steady motion to and fro.
+fn motion(tsp: f64, highest: f64) -> Vec<f64> {
+    let mut at = 0.0;
+    let next = |k: usize| {
+        let t = k as f64 * tsp - 0.5;
+        if t < 6.0 {
+            at = 0.001 * (1.0 - (TAU * t.max(0.0) / 3.0).cos());
+        } else if t < 16.0 {
+            let t = t - 6.0;
+            let ratio = highest / 2.0;
+            let phase = TAU * 2.0 * 10.0 / ratio.ln() * (ratio.powf(t / 10.0) - 1.0);
+            let steady = (10.0 * (TAU * t / 2.0).sin()).clamp(-1.0, 1.0);
+            at += tsp * (t / 0.2).min(1.0) * (0.025 * steady + 0.018 * phase.sin());
+        }
+        at
+    };
+    (0..(17.0 / tsp) as usize).map(next).collect()
+}
+
+/// Records X in `motion` every 0.5 ms, with encoders of 50 and 20 nm.
+fn recording(machine: &MachineConfig, highest: f64) -> RawRecording {
+    let psec = motion(seconds(machine.periods().position), highest);
+    let disturbance = Disturbance {
+        sample_ticks: Some(4),
+        resolution: 50e-9,
+        motor_resolution: Some(20e-9),
+        noise: CurrentNoise::OfLargest(0.005),
+        ..Disturbance::default()
+    };
+    let mut raw = record(machine, "x", &psec, &disturbance);
+    raw.psec = None;
+    raw
+}
+
+/// Identifies the transmission of X of the default machine, whose inertia is 20 % off.
+fn identified(raw: &RawRecording) -> (Identification, Parameters) {
+    let mut start = true_parameters();
+    let source = ValueSource::named("the test");
+    start.set("x.motor.inertia_kg_m2", Value::Double(0.8 * 0.028), &source).expect("in range");
+    let machine = start.machine_config().expect("a machine");
+    let axis = &machine.axes()[axis_index(&machine, "x")];
+    let conditioning = Conditioning { current_lag: Some(0.0), ..Conditioning::default() };
+    let signals = condition(raw, axis, &machine.periods(), &conditioning).expect("a recording").0;
+    let options = IdentificationOptions::default();
+    let found = identify_with_transmission(&[], &[&signals], axis, &machine.periods(), &options);
+    (found, start)
+}
+
+fn codes(found: &Identification) -> Vec<&'static str> {
+    found.findings.iter().map(|finding| finding.code).collect()
+}
+
+#[test]
+fn stiffness_load_damping_and_backlash_are_within_their_intervals_and_go_to_the_machine_file() {
+    let (found, start) = identified(&recording(&elastic(TRUTH), 60.0));
+    let fit = found.transmission.as_ref().unwrap_or_else(|| panic!("{:?}", found.findings));
+    let masses = fit.masses.as_ref().unwrap_or_else(|| panic!("{:?}", found.findings));
+    let (damping, gap) = (masses.damping.expect("damping"), fit.backlash.expect("a gap"));
+    let intervals = [(masses.stiffness, 1e6), (damping, 1.0), (masses.load, 1.0), (gap, 1e-6)];
+    for ((interval, unit), (truth, key)) in intervals.into_iter().zip(TRUTH.into_iter().zip(KEYS)) {
+        let [low, high] = interval.bounds.map(|bound| bound / unit);
+        println!("{key}: {:.4} ({low:.4} … {high:.4}), true {truth}", interval.value / unit);
+        assert!(low < truth && truth < high);
+        // The damping is a small part of the force.
+        assert!(high - low < if key == KEYS[1] { truth } else { 0.2 * truth });
+    }
+    let antiresonance = (150e6_f64 / 1300.0).sqrt() / TAU;
+    assert!((fit.antiresonance.value / antiresonance - 1.0).abs() < 2e-3, "{:?}", fit.antiresonance);
+    assert!(fit.r_squared > 0.999, "{}", fit.r_squared);
+    // The machine file has the true inertia of motor and load, too.
+    let mut machine = start.clone();
+    update_parameters(&mut machine, "x", &found.values(&start, "x")).expect("values in range");
+    let written = machine.machine_config().expect("a machine");
+    let axis = &written.axes()[axis_index(&written, "x")];
+    assert!((axis.motor.inertia / 0.028 - 1.0).abs() < 0.02, "{}", axis.motor.inertia);
+    let transmission = axis.transmission.expect("an elastic axis");
+    let square = axis.transmission_ratio * axis.transmission_ratio;
+    assert!((transmission.stiffness / (masses.stiffness.value * square) - 1.0).abs() < 1e-3);
+    assert!((transmission.backlash * axis.transmission_ratio / gap.value - 1.0).abs() < 1e-2);
+}
+
+#[test]
+fn a_closed_gap_gets_a_bound() {
+    let (found, _) = identified(&recording(&elastic([150.0, 15000.0, 1300.0, 0.0]), 60.0));
+    let fit = found.transmission.as_ref().unwrap_or_else(|| panic!("{:?}", found.findings));
+    assert_eq!(fit.backlash, None);
+    let bound = fit.excluded_backlash.expect("a bound");
+    println!("no backlash above {:.2} µm", bound * 1e6);
+    assert!(bound < 2e-6);
+}
+
+#[test]
+fn one_encoder_does_not_tell_the_transmission() {
+    let raw = RawRecording { motor_position: None, ..recording(&elastic(TRUTH), 60.0) };
+    let (found, start) = identified(&raw);
+    assert_eq!(found.transmission, None);
+    assert!(codes(&found).contains(&"one-encoder"), "{:?}", found.findings);
+    assert!(found.values(&start, "x").is_empty());
+}
+
+#[test]
+fn a_rigid_axis_gets_no_transmission() {
+    let machine = true_parameters().machine_config().expect("a machine");
+    let (found, start) = identified(&recording(&machine, 60.0));
+    assert_eq!(found.transmission, None);
+    assert!(codes(&found).contains(&"no-wind-up"), "{:?}", found.findings);
+    assert!(found.values(&start, "x").is_empty());
+}
+
+#[test]
+fn without_a_current_only_the_antiresonance_and_the_backlash_are_known() {
+    let raw = RawRecording { current: None, ..recording(&elastic(TRUTH), 60.0) };
+    let (found, start) = identified(&raw);
+    let fit = found.transmission.as_ref().unwrap_or_else(|| panic!("{:?}", found.findings));
+    assert!(codes(&found).contains(&"no-load-inertia"), "{:?}", found.findings);
+    assert_eq!(fit.masses, None);
+    let gap = fit.backlash.expect("a gap");
+    assert!(gap.bounds[0] < 9e-6 && 9e-6 < gap.bounds[1], "{gap:?}");
+    // Neither is complete enough for the machine file.
+    assert!(found.values(&start, "x").is_empty());
+}
+
+#[test]
+fn random_axes_get_no_transmission_that_they_do_not_have() {
+    let mut study = TransmissionStudy::default();
+    (6200..6230).for_each(|seed| _ = study.add(seed));
+    print!("{study}");
+    let (mut inside, mut count) = (0, 0);
+    for case in study.cases() {
+        let Some(truth) = case.truth else {
+            assert_eq!(case.found, None, "{case}");
+            continue;
+        };
+        let Some(fit) = &case.found else { continue };
+        assert!(truth.backlash > 0.0 || fit.backlash.is_none(), "{case}");
+        let Some(masses) = &fit.masses else { continue };
+        for (interval, truth) in [(masses.stiffness, truth.stiffness), (masses.load, truth.load)] {
+            count += 1;
+            inside += usize::from((interval.bounds[0]..=interval.bounds[1]).contains(&truth));
+        }
+    }
+    // 95 % intervals: fewer than four in five within them has a probability below 1e-6.
+    assert!(count > 30 && 5 * inside >= 4 * count, "{inside} of {count}");
+}
