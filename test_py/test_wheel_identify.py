@@ -72,6 +72,44 @@ def test_an_identification_from_arrays_has_the_values_of_the_file(campaign: Path
     assert found.deviations == errors
 
 
+@pytest.fixture(scope="module")
+def both_encoders() -> dict[str, np.ndarray]:
+    """Returns a chirp of an elastic X with a gap of 9 µm, recorded with both encoders each millisecond."""
+    changes = {
+        "x.transmission.stiffness_n_um": 40.0,
+        "x.transmission.damping_n_s_m": 15000.0,
+        "x.transmission.load_mass_kg": 1300.0,
+        "x.transmission.backlash_um": 9.0,
+    }
+    time = 0.006 * np.arange(2000)
+    phase = 2 * np.pi * 20 / np.log(12) * (12 ** (time / 12) - 1)
+    steady = np.clip(10 * np.sin(np.pi * time), -1, 1)
+    psec = np.cumsum(0.006 * np.minimum(time / 0.2, 1) * (0.025 * steady + 0.018 * np.sin(phase)))
+    signals = ["position", "wind_up", "current"]
+    run = va.Machine.load().with_(changes).simulate({"x": psec}, signals=signals, every_tick=True, figures="axes")
+    position, wind_up, current = (run.signals[name][::8, 0] for name in signals)
+    return {
+        "time": run.time[::8],
+        "position": position,
+        "motor_position": position + wind_up,
+        "current": current,
+    }
+
+
+def test_both_encoders_identify_a_transmission(both_encoders: dict[str, np.ndarray]) -> None:
+    found = va.identify([], "x", transmission=both_encoders)
+    found_hz = found.summary["transmission"]["antiresonance_hz"]
+    low, high = found_hz["interval"]
+    truth = np.sqrt(40e6 / 1300) / (2 * np.pi)
+    assert low < truth < high
+    assert found.summary["transmission_recordings"][0]["name"] == "recording 1"
+    one = {name: values for name, values in both_encoders.items() if name != "motor_position"}
+    with pytest.raises(ValueError, match="one encoder does not tell"):
+        va.identify([], "x", transmission=one)
+    with pytest.raises(ValueError, match="recordings: are empty"):
+        va.identify([], "x")
+
+
 def test_the_report_of_an_identification_has_its_values(campaign: Path) -> None:
     page = va.identify(campaign, "x", feedforward="off", refine=()).report()
     assert page.startswith("<!DOCTYPE html>") and "x.friction.a" in page and "<svg" in page

@@ -7,7 +7,7 @@ use virtual_axes_core::config::{AxisKind, MachineConfig, Parameters, ValueSource
 use virtual_axes_core::statistics::quantile;
 use virtual_axes_core::units::{DEGREE, NEWTON_PER_MICROMETER, seconds};
 use virtual_axes_identify::identify::{
-    IdentificationOptions, Interval, TransmissionFit, identify_with_transmission,
+    ConfidenceInterval, IdentificationOptions, TransmissionFit, identify_with_transmission,
 };
 use virtual_axes_identify::recording::{Conditioning, condition};
 
@@ -231,7 +231,8 @@ fn study(seed: u64) -> TransmissionCase {
 }
 
 /// Quantities of the study with their values.
-type Quantity = (&'static str, fn(&TrueTransmission) -> f64, fn(&TransmissionFit) -> Option<Interval>);
+type Quantity =
+    (&'static str, fn(&TrueTransmission) -> f64, fn(&TransmissionFit) -> Option<ConfidenceInterval>);
 
 const QUANTITIES: [Quantity; 5] = [
     ("antiresonance", |t| t.antiresonance, |f| Some(f.antiresonance)),
@@ -241,7 +242,7 @@ const QUANTITIES: [Quantity; 5] = [
     ("backlash", |t| t.backlash, |f| f.backlash),
 ];
 
-fn contains(interval: &Interval, truth: f64) -> bool {
+fn contains(interval: &ConfidenceInterval, truth: f64) -> bool {
     (interval.bounds[0]..=interval.bounds[1]).contains(&truth)
 }
 
@@ -290,7 +291,7 @@ impl fmt::Display for TransmissionStudy {
             "", "number", "median", "90 %", "largest", "coverage"
         )?;
         for (name, of, value) in QUANTITIES {
-            let found: Vec<(f64, Interval)> = elastic()
+            let found: Vec<(f64, ConfidenceInterval)> = elastic()
                 .filter_map(|(case, truth)| Some((of(&truth), case.found.as_ref().and_then(value)?)))
                 .collect();
             let mut errors: Vec<f64> =

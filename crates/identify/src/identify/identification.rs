@@ -8,7 +8,7 @@ use super::gravity::{GravityFit, SteadyMeasurements};
 use super::inertia::InertiaFit;
 use super::presliding::PreslidingFit;
 use super::refine::{RefinedParameter, Refinement};
-use super::transmission::{Interval, TransmissionFit};
+use super::transmission::{ConfidenceInterval, TransmissionFit};
 use super::validate::Agreement;
 use crate::recording::Finding;
 use virtual_axes_core::config::{AxisConfig, Periods};
@@ -59,7 +59,7 @@ pub struct Identification {
 impl Identification {
     /// Returns the inertia of motor and load, kg or kg·m² at the axis, if the recordings with both encoders tell it and the
     /// others do not.
-    pub(super) fn inertia_of_both_encoders(&self) -> Option<Interval> {
+    pub(super) fn inertia_of_both_encoders(&self) -> Option<ConfidenceInterval> {
         let is_known = self.inertia.is_some() || self.refined(RefinedParameter::Inertia).is_some();
         let masses = self.transmission.as_ref()?.masses.as_ref()?;
         (!is_known).then_some(masses.total)

@@ -61,7 +61,7 @@ pub(crate) use resample::BandLimitedSpline;
 pub use sanity::invalid_agreement;
 pub use segments::{MotionSegment, SegmentKind, find_segments};
 pub use steps::{identify, identify_with_transmission};
-pub use transmission::{Interval, MassesFit, TransmissionFit};
+pub use transmission::{ConfidenceInterval, MassesFit, TransmissionFit};
 pub use validate::{
     Agreement, Baseline, ExperimentComparison, InverseDynamics, ResidualStatistics, constant_lag, validate,
 };

@@ -201,7 +201,7 @@ impl<'a> IdentificationSteps<'a> {
     /// Fits the transmission; the inertia of the axis is that of motor and load if the other recordings do not tell it.
     fn fit_transmission(&mut self, recordings: &[&Signals]) {
         let found = &mut self.found;
-        found.transmission = fit_transmission(recordings, &found.axis, &mut found.findings);
+        found.transmission = fit_transmission(recordings, (&found.axis, self.periods), &mut found.findings);
         let Some(fit) = &found.transmission else { return };
         fit.apply(&mut found.axis);
         if let Some(total) = found.inertia_of_both_encoders() {

@@ -23,18 +23,18 @@ use self::contact::{BLOCKS, ContactFit, Gap, fit_contact};
 use self::motion::TwoEncoderMotion;
 use super::presliding::student;
 use crate::recording::{Finding, Signals};
-use virtual_axes_core::config::{AxisConfig, AxisKind, TransmissionConfig};
-use virtual_axes_core::units::{MICROMETER, MILLISECOND, Rounded};
+use virtual_axes_core::config::{AxisConfig, AxisKind, Periods, TransmissionConfig};
+use virtual_axes_core::units::{MICROMETER, Rounded, seconds};
 
 /// Smallest spread of the twist in standard deviations by the encoders.
 const NOISE: f64 = 5.0;
 /// Largest half of a 95 % interval, relative to the value.
 const UNCERTAIN: f64 = 0.5;
-/// Standard errors relative to the value that all blocks share, by the filter and by a sampling period of 1 ms: of the
-/// antiresonance, of values with the current, and of the damping.
+/// Standard errors relative to the value that all blocks share: by the filter, and, with the current, by a sampling period as
+/// long as the position cycle, within which the current varies; the latter grows with its square.
 const SYSTEMATIC: [f64; 2] = [0.005, 0.0];
-const WITH_CURRENT: [f64; 2] = [0.007, 0.01];
-const OF_DAMPING: [f64; 2] = [0.02, 0.02];
+const WITH_CURRENT: [f64; 2] = [0.007, 0.36];
+const OF_DAMPING: [f64; 2] = [0.02, 0.36];
 /// Standard errors of a 95 % interval.
 const INTERVAL: f64 = 1.96;
 /// Standard error of the width of the gap that all blocks share, relative to the twist by the encoders, to the spread of
@@ -43,17 +43,17 @@ const GAP: [f64; 3] = [1.0, 0.01, 0.01];
 
 /// Value with the bounds of its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
+pub struct ConfidenceInterval {
     /// Value.
     pub value: f64,
     /// Bounds.
     pub bounds: [f64; 2],
 }
 
-impl Interval {
+impl ConfidenceInterval {
     /// Creates an interval that is symmetric about the value.
     fn about(value: f64, half: f64) -> Self {
-        Interval { value, bounds: [value - half, value + half] }
+        ConfidenceInterval { value, bounds: [value - half, value + half] }
     }
 
     /// Returns the standard deviation of a normal distribution with the width of the interval.
@@ -70,11 +70,11 @@ impl Interval {
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransmissionFit {
     /// Frequency of the antiresonance √(k/Ml)/2π, Hz.
-    pub antiresonance: Interval,
+    pub antiresonance: ConfidenceInterval,
     /// Masses and the values that need them; none if the recordings tell the antiresonance only.
     pub masses: Option<MassesFit>,
     /// Width of the gap, m or rad; none if it is not above 0.
-    pub backlash: Option<Interval>,
+    pub backlash: Option<ConfidenceInterval>,
     /// Width of the gap that is excluded, m or rad; none with an identified gap, or if one flank is never touched.
     pub excluded_backlash: Option<f64>,
     /// Coefficient of determination R² of the acceleration of the load.
@@ -85,13 +85,13 @@ pub struct TransmissionFit {
 #[derive(Debug, Clone, PartialEq)]
 pub struct MassesFit {
     /// Inertia of the load Ml, kg or kg·m².
-    pub load: Interval,
+    pub load: ConfidenceInterval,
     /// Inertia of motor and load, kg or kg·m².
-    pub total: Interval,
+    pub total: ConfidenceInterval,
     /// Stiffness k, N/m or N·m/rad.
-    pub stiffness: Interval,
+    pub stiffness: ConfidenceInterval,
     /// Damping d, N·s/m or N·m·s/rad; none if it is not above 0.
-    pub damping: Option<Interval>,
+    pub damping: Option<ConfidenceInterval>,
 }
 
 impl TransmissionFit {
@@ -114,7 +114,7 @@ impl TransmissionFit {
 /// Fits the transmission of `axis`, whose friction law and gravity are known, and reports findings.
 pub(super) fn fit_transmission(
     recordings: &[&Signals],
-    axis: &AxisConfig,
+    (axis, periods): (&AxisConfig, &Periods),
     findings: &mut Vec<Finding>,
 ) -> Option<TransmissionFit> {
     let missing: Vec<&str> = recordings
@@ -143,7 +143,7 @@ pub(super) fn fit_transmission(
         return None;
     }
     let period = recordings.iter().map(|signals| signals.period).fold(0.0, f64::max);
-    let fit = TransmissionSearch { motions: &motions, axis, period };
+    let fit = TransmissionSearch { motions: &motions, axis, sampling: period / seconds(periods.position) };
     match fit.run(findings) {
         Ok(found) => Some(found),
         Err(finding) => {
@@ -156,8 +156,8 @@ pub(super) fn fit_transmission(
 struct TransmissionSearch<'a> {
     motions: &'a [TwoEncoderMotion],
     axis: &'a AxisConfig,
-    /// Longest sampling period, s.
-    period: f64,
+    /// Longest sampling period, relative to the position cycle.
+    sampling: f64,
 }
 
 impl TransmissionSearch<'_> {
@@ -210,15 +210,15 @@ impl TransmissionSearch<'_> {
     }
 
     /// Returns the width of the gap; none if one flank is never touched.
-    fn gap(&self, fit: &ContactFit) -> Option<Interval> {
+    fn gap(&self, fit: &ContactFit) -> Option<ConfidenceInterval> {
         let sizes = [fit.noise, fit.spread, fit.gap[1]];
         let shared = sizes.iter().zip(GAP).map(|(x, part)| x * part).fold(0.0, f64::hypot);
         let half = (student(BLOCKS - 1) * scatter(fit.widths.as_ref()?)).hypot(INTERVAL * shared);
-        Some(Interval::about(fit.gap[1], half))
+        Some(ConfidenceInterval::about(fit.gap[1], half))
     }
 
     /// Returns the finding about a twist that the encoders do not resolve.
-    fn too_stiff(&self, fit: &ContactFit, antiresonance: Interval) -> Finding {
+    fn too_stiff(&self, fit: &ContactFit, antiresonance: ConfidenceInterval) -> Finding {
         let (unit, name) = match self.axis.kind() {
             AxisKind::Linear => (MICROMETER, "µm"),
             AxisKind::Rotary => (1.0, "rad"),
@@ -254,14 +254,14 @@ impl TransmissionSearch<'_> {
     fn interval(
         &self,
         (value, without): &(f64, Vec<f64>),
-        [always, per_ms]: [f64; 2],
+        [always, by_sampling]: [f64; 2],
         of: impl Fn(f64) -> f64,
-    ) -> Interval {
+    ) -> ConfidenceInterval {
         let parts: Vec<f64> = without.iter().map(|x| of(*x)).collect();
         let value = of(*value);
-        let shared = always.hypot(per_ms * self.period / MILLISECOND);
+        let shared = always.hypot(by_sampling * self.sampling * self.sampling);
         let half = (student(BLOCKS - 1) * scatter(&parts)).hypot(INTERVAL * shared * value);
-        Interval::about(value, half)
+        ConfidenceInterval::about(value, half)
     }
 
     /// Returns the masses; none if the current does not tell them apart.
@@ -301,7 +301,7 @@ impl TransmissionSearch<'_> {
         let [stiffness, load, total] =
             [stiffness, load, sum].map(|value| self.interval(&value, WITH_CURRENT, |x| x));
         let damping = self.interval(&damping, OF_DAMPING, |x| x);
-        let is_certain = [load, total, stiffness].iter().all(Interval::is_certain);
+        let is_certain = [load, total, stiffness].iter().all(ConfidenceInterval::is_certain);
         let is_possible = load.value > 0.0 && load.value < total.value;
         (is_certain && is_possible).then_some(MassesFit {
             load,

@@ -9,7 +9,7 @@ use super::super::gravity::{GravityCurrent, GravityFit, GravitySource, SAME_SPEE
 use super::super::identification::Identification;
 use super::super::presliding::PreslidingFit;
 use super::super::refine::{RefinedParameter, RefinedValue, Refinement};
-use super::super::transmission::{Interval, TransmissionFit};
+use super::super::transmission::{ConfidenceInterval, TransmissionFit};
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::units::{DEGREE, MICROMETER, MILLISECOND_NS, NEWTON_PER_MICROMETER, Nanoseconds};
 
@@ -289,7 +289,7 @@ impl TransmissionSummary {
             AxisKind::Linear => ("kg", "N/um", NEWTON_PER_MICROMETER, MICROMETER),
             AxisKind::Rotary => ("kg.m2", "N.m/rad", 1.0, 1e-3 * DEGREE),
         };
-        let scaled = |found: Interval, unit: f64| IntervalSummary {
+        let scaled = |found: ConfidenceInterval, unit: f64| IntervalSummary {
             value: found.value / unit,
             interval: found.bounds.map(|bound| bound / unit),
         };
@@ -374,7 +374,7 @@ pub struct DelaySummary {
     pub feedforward: FeedforwardMode,
     /// Identified delay, ms.
     pub value_ms: f64,
-    /// Interval of equivalent delays, ms: above the first and up to the second value.
+    /// ConfidenceInterval of equivalent delays, ms: above the first and up to the second value.
     pub interval_ms: [f64; 2],
     /// True if the value of the machine file was kept.
     #[serde(rename = "left")]
