@@ -200,7 +200,7 @@ fn invalid_mappings_are_rejected() {
     assert_eq!(
         message_of("positon=p"),
         "--column: unknown key \"positon\"; known are time, psec, position, velocity, current, \
-         velocity_feedforward, torque_feedforward, delimiter, decimal_comma, skip_lines; the nearest is position"
+         velocity_feedforward, torque_feedforward, motor_position, wind_up, delimiter, decimal_comma, skip_lines; the nearest is position"
     );
     assert_eq!(message_of("time="), "--column: time=: the column is missing");
     for wrong in ["#0", "#", "#x", "#-1", "#1.5"] {
@@ -298,6 +298,7 @@ fn a_trace_of_this_package_requires_no_mapping() {
             position: 0.1 * v,
             velocity: 0.2 * v,
             current: 0.3 * v,
+            wind_up: 0.5 * v,
             ..AxisSample::default()
         };
         trace.row(i64::from(k) * 6_000_000, &[sample(v), sample(-7.0)]).expect("in memory");
@@ -310,6 +311,8 @@ fn a_trace_of_this_package_requires_no_mapping() {
         position: Some(vec![0.0, 0.1, 0.2]),
         velocity: Some(vec![0.0, 0.2, 0.4]),
         current: Some(vec![0.0, 0.3, 0.6]),
+        // Position and wind-up.
+        motor_position: Some(vec![0.0, 0.6, 1.2]),
         ..RawRecording::default()
     };
     assert_eq!(good(&text, &[]), by_hand);

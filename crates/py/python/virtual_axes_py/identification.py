@@ -98,17 +98,17 @@ def identify(
 
     `recordings` are files (CSV, MCAP, exports of controls) or dictionaries of equally long channels: `time` (s),
     `position` and `psec` (m or rad), `velocity` (m/s or rad/s of the axis), `current` (A), `velocity_feedforward`
-    (rad/s of the motor), `torque_feedforward` (N·m) and `motor_position` (m or rad at the axis). `machine` (default: the first built-in one) has the initial
-    values.
+    (rad/s of the motor), `torque_feedforward` (N·m) and `motor_position` (m or rad at the axis). `machine` (default:
+    the first built-in one) has the initial values.
 
     The options are those of the command: `transmission` are recordings with the encoders of motor and load, to identify
-    stiffness, damping, inertia of the load and backlash, beside `recordings` or alone with `[]`; `validate` are recordings to compare with the result; `feedforward` is the
-    active one, `off`, `velocity` or `both`, for all or for each recording; `refine` are the groups that the refinement
-    in closed loop adjusts (`inertia`, `friction`, `gravity`, `feedforward`, `gain`; by default all, `()` for none);
-    `free_i0` refines the breakaway current by itself; `presliding` identifies stiffness and damping of the presliding
-    from slow reversals, with the lag `current_lag_ms` of the current, 0 by default; `column`, `columns`, `topic`,
-    `joint`, `format` and `rate_hz` read the files; `cutoff_hz`, `current_lag_ms`, `trace_filter_hz` and `psec_shift`
-    (ms, or `auto`) condition the signals.
+    stiffness, damping, inertia of the load and backlash, beside `recordings` or alone with `[]`; `validate` are
+    recordings to compare with the result; `feedforward` is the active one, `off`, `velocity` or `both`, for all or for
+    each recording; `refine` are the groups that the refinement in closed loop adjusts (`inertia`, `friction`,
+    `gravity`, `feedforward`, `gain`; by default all, `()` for none); `free_i0` refines the breakaway current by itself;
+    `presliding` identifies stiffness and damping of the presliding from slow reversals, with the lag `current_lag_ms`
+    of the current, 0 by default; `column`, `columns`, `topic`, `joint`, `format` and `rate_hz` read the files;
+    `cutoff_hz`, `current_lag_ms`, `trace_filter_hz` and `psec_shift` (ms, or `auto`) condition the signals.
 
     Raises `ValueError` with the command's text for an unreadable or implausible recording, or if no parameter can be
     identified. Releases the global interpreter lock.
