@@ -10,7 +10,9 @@ use virtual_axes_core::design::{
     self, ControlLoop, ControlWeight, GpcTuning, PidTuning, PolePlacement, PredictionModel as CoreModel,
     continuous_phases, magnitudes_db,
 };
-use virtual_axes_core::machine::{design_controller, loop_response, prediction_model};
+use virtual_axes_core::machine::{
+    contour_axes, contour_response, design_controller, loop_response, prediction_model,
+};
 use virtual_axes_core::units::DEGREE;
 
 use crate::convert::value_error;
@@ -190,11 +192,23 @@ pub fn frequency_response_of<'py>(
     name: &str,
 ) -> PyResult<Bound<'py, PyDict>> {
     let axis = axis_of(machine, axis)?;
-    let control_loop = ControlLoop::ALL.into_iter().find(|one| one.name() == name).ok_or_else(|| {
-        value_error(format!("control_loop {name:?}: must be current, velocity or position"))
-    })?;
-    let response = py
-        .detach(|| loop_response(axis, &machine.config.periods(), control_loop).map(|model| model.sample()));
+    let control_loop = ControlLoop::ALL.into_iter().find(|one| one.name() == name);
+    let (periods, gain) = (machine.config.periods(), machine.config.contour_gain());
+    let coupled = contour_axes(gain, machine.config.axes().iter());
+    let is_coupled = coupled.iter().any(|&index| machine.config.axes()[index].name() == axis.name());
+    let response = match control_loop {
+        Some(control_loop) => py.detach(|| loop_response(axis, &periods, control_loop)),
+        None if name != "contour" => {
+            let text = format!("control_loop {name:?}: must be current, velocity, position or contour");
+            return Err(value_error(text));
+        }
+        None if !is_coupled => {
+            let text = format!("control_loop contour: cross-coupled control does not act on {}", axis.name());
+            return Err(value_error(text));
+        }
+        None => py.detach(|| contour_response(axis, &periods, gain)),
+    };
+    let response = response.map(|model| model.sample());
     let response = response.map_err(|error| value_error(format!("axis {}: {error}", axis.name())))?;
     let degrees = |values: &[Complex64]| -> Vec<f64> {
         continuous_phases(values).into_iter().map(|phase| phase / DEGREE).collect()

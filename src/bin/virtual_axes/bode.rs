@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::design::{ControlLoop, DesignError, FrequencyResponse, LoopMargins, LoopResponse};
-use virtual_axes_core::machine::{NaturalFrequencies, loop_response, natural_frequencies};
+use virtual_axes_core::machine::{
+    NaturalFrequencies, contour_axes, contour_response, loop_response, natural_frequencies,
+};
 use virtual_axes_io::files::OutputFile;
 
 use crate::design::selected_axes;
@@ -44,16 +46,28 @@ pub struct BodeArguments {
 
 /// Control loop on the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum LoopName {
+pub enum LoopName {
     /// Current loop.
     Current,
     /// Velocity loop.
     Velocity,
     /// Position loop.
     Position,
+    /// Position loop across a path, with the gain of cross-coupled control.
+    Contour,
 }
 
 impl LoopName {
+    /// Returns the name: current, velocity, position or contour.
+    pub fn name(self) -> &'static str {
+        match self {
+            LoopName::Current => ControlLoop::Current.name(),
+            LoopName::Velocity => ControlLoop::Velocity.name(),
+            LoopName::Position => ControlLoop::Position.name(),
+            LoopName::Contour => "contour",
+        }
+    }
+
     fn of(control_loop: ControlLoop) -> Self {
         match control_loop {
             ControlLoop::Current => LoopName::Current,
@@ -78,7 +92,7 @@ pub struct AxisLoops {
 #[derive(Debug)]
 pub struct AnalyzedLoop {
     /// Loop.
-    pub control_loop: ControlLoop,
+    pub control_loop: LoopName,
     /// Cycle, s.
     pub period: f64,
     /// Margins, or an error with the unstable pole.
@@ -93,9 +107,18 @@ pub struct AnalyzedLoop {
 pub fn run(arguments: &BodeArguments) -> Result<String, Box<dyn Error>> {
     check_outputs(arguments)?;
     let config = arguments.machine.parameters()?.machine_config()?;
+    let gain = config.contour_gain();
+    let coupled: Vec<&str> = contour_axes(gain, config.axes().iter())
+        .into_iter()
+        .filter_map(|index| config.axes().get(index).map(AxisConfig::name))
+        .collect();
+    if arguments.loops == [LoopName::Contour] && coupled.is_empty() {
+        return Err("--loop contour: cross-coupled control is off; set contour_control.gain above 0".into());
+    }
     let mut axes = Vec::new();
     for axis in selected_axes(config.axes(), &arguments.axis)? {
-        let loops = analyze(axis, &config.periods(), &arguments.loops)
+        let gain = coupled.contains(&axis.name()).then_some(gain);
+        let loops = analyze((axis, gain), &config.periods(), &arguments.loops)
             .map_err(|error| format!("axis {}: {error}", axis.name()))?;
         axes.push(loops);
     }
@@ -138,17 +161,27 @@ fn check_outputs(arguments: &BodeArguments) -> Result<(), String> {
     }
 }
 
-fn analyze(axis: &AxisConfig, periods: &Periods, selected: &[LoopName]) -> Result<AxisLoops, Box<dyn Error>> {
+/// Analyzes the selected loops of an axis; `contour_gain` is the gain of cross-coupled control, 1/s, if it acts on the axis.
+fn analyze(
+    (axis, contour_gain): (&AxisConfig, Option<f64>),
+    periods: &Periods,
+    selected: &[LoopName],
+) -> Result<AxisLoops, Box<dyn Error>> {
+    let is_selected = |name: LoopName| selected.is_empty() || selected.contains(&name);
     let mut loops = Vec::new();
     for control_loop in ControlLoop::ALL {
-        if selected.is_empty() || selected.contains(&LoopName::of(control_loop)) {
-            loops.push(analyzed(control_loop, &loop_response(axis, periods, control_loop)?));
+        let name = LoopName::of(control_loop);
+        if is_selected(name) {
+            loops.push(analyzed(name, &loop_response(axis, periods, control_loop)?));
         }
+    }
+    if let Some(gain) = contour_gain.filter(|_| is_selected(LoopName::Contour)) {
+        loops.push(analyzed(LoopName::Contour, &contour_response(axis, periods, gain)?));
     }
     Ok(AxisLoops { axis: axis.name().to_owned(), natural_frequencies: natural_frequencies(axis), loops })
 }
 
-fn analyzed(control_loop: ControlLoop, model: &LoopResponse) -> AnalyzedLoop {
+fn analyzed(control_loop: LoopName, model: &LoopResponse) -> AnalyzedLoop {
     let margins = model.margins();
     // The response of an unstable loop has no peak that could be measured.
     let peak = margins.as_ref().ok().and_then(|_| model.resonance_peak());

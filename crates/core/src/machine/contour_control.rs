@@ -30,19 +30,17 @@ impl ContourControl {
     /// # Errors
     /// [`MachineError::Axis`] with [`AxisError::ContourControl`] if the gain makes the loop of an axis unstable.
     pub fn new(config: &MachineConfig, indices: &[usize]) -> Result<Option<Self>, MachineError> {
+        let selected = || indices.iter().filter_map(|&index| config.axes.get(index));
         let gain = config.contour_gain;
-        let is_linear = |&&(_, axis): &&(usize, &AxisConfig)| axis.kind == AxisKind::Linear;
-        let selected: Vec<(usize, &AxisConfig)> =
-            indices.iter().filter_map(|&index| config.axes.get(index)).enumerate().collect();
-        let linear: Vec<_> = selected.iter().filter(is_linear).take(CONTOUR_AXES).collect();
-        if gain <= 0.0 || linear.len() < 2 {
+        let axes = contour_axes(gain, selected());
+        if axes.is_empty() {
             return Ok(None);
         }
-        for (_, axis) in &linear {
+        for axis in axes.iter().filter_map(|&index| selected().nth(index)) {
             require_stable_contour(axis, &config.periods, gain)
                 .map_err(|source| MachineError::Axis { axis: axis.name.clone(), source })?;
         }
-        Ok(Some(ContourControl { gain, axes: linear.iter().map(|(index, _)| *index).collect() }))
+        Ok(Some(ContourControl { gain, axes }))
     }
 
     /// Returns the control of a machine whose axes come after `count` others.
@@ -75,6 +73,14 @@ impl ContourControl {
     }
 }
 
+/// Returns the indices of the axes on which cross-coupled control with the gain K, 1/s, acts: the first three linear ones;
+/// none without a gain or with a single linear axis.
+pub fn contour_axes<'a>(gain: f64, axes: impl Iterator<Item = &'a AxisConfig>) -> Vec<usize> {
+    let linear = axes.enumerate().filter(|(_, axis)| axis.kind == AxisKind::Linear);
+    let found: Vec<usize> = linear.map(|(index, _)| index).take(CONTOUR_AXES).collect();
+    if gain > 0.0 && found.len() > 1 { found } else { Vec::new() }
+}
+
 /// Checks that the position loop of `axis` is stable with the gain of cross-coupled control in addition, as across a path
 /// perpendicular to the axis.
 fn require_stable_contour(axis: &AxisConfig, periods: &Periods, gain: f64) -> Result<(), AxisError> {
@@ -96,7 +102,15 @@ pub fn design_contour_controller(
     model: &PredictionModel,
     gain: f64,
 ) -> Result<Rst, DesignError> {
-    let rst = design_controller(axis, model)?;
+    with_contour_gain(&design_controller(axis, model)?, gain)
+}
+
+/// Returns a position controller with the gain K of cross-coupled control, 1/s, in addition; see
+/// [`design_contour_controller`].
+///
+/// # Errors
+/// [`DesignError`] if the sum is no controller.
+pub fn with_contour_gain(rst: &Rst, gain: f64) -> Result<Rst, DesignError> {
     let mut r = rst.r().to_vec();
     // The controller sees the sum as its output, so that K adds to r₀ in units of s₀.
     r[0] += gain * rst.s()[0];

@@ -9,7 +9,7 @@ use crate::drive::{LoadState, MotorState, Plant};
 use crate::units::seconds;
 
 use super::prediction::{LinearInnerLoops, deviating_plant_model, prediction_model};
-use super::{AxisError, design_controller};
+use super::{AxisError, design_contour_controller, design_controller};
 
 /// Returns the linear model of a control loop of an axis: its frequency response and margins.
 ///
@@ -42,6 +42,16 @@ pub fn loop_response(
             LoopResponse::velocity(loops.velocity, loops.filters, plant, closed, seconds(periods.velocity))
         }
     })
+}
+
+/// Returns the linear model of the position loop of an axis across a path, with the gain K of cross-coupled control, 1/s, in
+/// addition to the position controller; otherwise as [`loop_response`].
+///
+/// # Errors
+/// [`AxisError`] as [`loop_response`] for the position loop.
+pub fn contour_response(axis: &AxisConfig, periods: &Periods, gain: f64) -> Result<LoopResponse, AxisError> {
+    let controller = design_contour_controller(axis, &prediction_model(axis, periods)?, gain)?;
+    Ok(LoopResponse::position(deviating_plant_model(axis, periods)?, controller))
 }
 
 /// Undamped natural frequencies of an elastic axis.

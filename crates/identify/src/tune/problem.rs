@@ -8,11 +8,11 @@ use super::margin_limits::{MarginLimits, worst_margins};
 use super::progress::Progress;
 use super::tuning::Tuning;
 use super::workload::Workload;
-use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig, Parameters};
-use virtual_axes_core::control::{CONTOUR_AXES, Rst};
+use virtual_axes_core::config::{AxisConfig, MachineConfig, Parameters};
+use virtual_axes_core::control::Rst;
 use virtual_axes_core::design::{DesignError, Margins, PredictionModel, gpc};
 use virtual_axes_core::machine::{
-    MachineError, design_contour_controller, design_controller, prediction_model,
+    MachineError, contour_axes, design_controller, prediction_model, with_contour_gain,
 };
 use virtual_axes_core::trial::{Figures, TrialError, TrialOutcome};
 use virtual_axes_core::units::POSITION_GAIN;
@@ -60,8 +60,6 @@ pub struct TuningProblem<'a> {
     joints: Vec<String>,
     /// Prediction models of the moving axes.
     models: Vec<PredictionModel>,
-    /// Axes of cross-coupled control, the linear ones, with their prediction models.
-    contour_axes: Vec<(AxisConfig, PredictionModel)>,
     present: TuningCandidate,
 }
 
@@ -90,26 +88,12 @@ impl<'a> TuningProblem<'a> {
                 .map_err(|source| MachineError::Axis { axis: axis.name().to_owned(), source })
         };
         let models = axes.iter().map(model).collect::<Result<Vec<_>, _>>()?;
-        let linear = config.axes().iter().filter(|axis| axis.kind() == AxisKind::Linear).take(CONTOUR_AXES);
-        let contour_axes: Vec<_> =
-            linear.map(|axis| Ok((axis.clone(), model(&axis)?))).collect::<Result<_, MachineError>>()?;
-        let margins = worst_margins(
-            models.iter().zip(&axes).map(|(model, axis)| (model, design_controller(axis, model))),
-        );
         let joints = axes.iter().map(|axis| axis.name().to_owned()).collect();
-        let present = candidate(Tuning::Present, margins, figures, cost, &config);
-        Ok(TuningProblem {
-            parameters,
-            workload,
-            cost,
-            progress,
-            config,
-            moving,
-            joints,
-            models,
-            contour_axes,
-            present,
-        })
+        let present = candidate(Tuning::Present, None, figures, cost, &config);
+        let mut problem =
+            TuningProblem { parameters, workload, cost, progress, config, moving, joints, models, present };
+        problem.present.margins = problem.margins(&Tuning::Present);
+        Ok(problem)
     }
 
     /// Returns the present tuning of the machine.
@@ -151,28 +135,34 @@ impl<'a> TuningProblem<'a> {
         self.moving.iter().filter_map(|&axis| self.config.axes().get(axis))
     }
 
-    /// Returns the margins of the worst axis with `tuning`; none if a loop is unstable or has no design.
+    /// Returns the margins of the worst moving axis with `tuning`, with cross-coupled control along and across the path; none
+    /// if a loop is unstable or has no design.
     pub fn margins(&self, tuning: &Tuning) -> Option<Margins> {
-        match tuning {
-            Tuning::Present => self.present.margins,
-            Tuning::ContourGain(gain) => {
-                let axes = || self.axes().zip(&self.models);
-                let along = axes().map(|(axis, model)| (model, design_controller(axis, model)));
-                let across = self.contour_axes.iter().map(|(axis, model)| {
-                    (model, design_contour_controller(axis, model, gain * POSITION_GAIN))
-                });
-                worst_margins(along.chain(across))
-            }
+        let present = || self.axes().zip(&self.models).map(|(axis, model)| design_controller(axis, model));
+        let along: Vec<Result<Rst, DesignError>> = match tuning {
+            Tuning::Present | Tuning::ContourGain(_) => present().collect(),
             Tuning::Gpc { .. } => {
                 let design = tuning.gpc()?;
-                worst_margins(self.models.iter().map(|model| (model, gpc(model, &design))))
+                self.models.iter().map(|model| gpc(model, &design)).collect()
             }
             Tuning::Cascade(axes) => {
-                worst_margins(self.models.iter().zip(axes).map(|(model, (_, gains))| {
-                    (model, Rst::proportional(gains.gain * POSITION_GAIN).map_err(DesignError::from))
-                }))
+                let proportional = |gain: f64| Rst::proportional(gain * POSITION_GAIN);
+                axes.iter().map(|(_, gains)| proportional(gains.gain).map_err(DesignError::from)).collect()
             }
-        }
+        };
+        let gain = match tuning {
+            Tuning::ContourGain(gain) => gain * POSITION_GAIN,
+            _ => self.config.contour_gain(),
+        };
+        let coupled = contour_axes(gain, self.config.axes().iter());
+        let designs = || self.models.iter().zip(&along);
+        let across = self
+            .moving
+            .iter()
+            .zip(designs())
+            .filter(|(axis, _)| coupled.contains(axis))
+            .map(|(_, (model, rst))| (model, rst.clone().and_then(|rst| with_contour_gain(&rst, gain))));
+        worst_margins(designs().map(|(model, rst)| (model, rst.clone())).chain(across))
     }
 
     /// Runs `tuning` on the workload; `margins` is the result of [`Self::margins`].

@@ -9,7 +9,9 @@ use super::progress::Progress;
 use super::workload::Workload;
 use virtual_axes_core::config::{Assignment, MachineConfig, Parameters, Value, ValueSource};
 use virtual_axes_core::design::Margins;
-use virtual_axes_core::machine::{MachineError, design_controller, deviating_plant_model, prediction_model};
+use virtual_axes_core::machine::{
+    MachineError, contour_axes, design_controller, deviating_plant_model, prediction_model, with_contour_gain,
+};
 use virtual_axes_core::trial::Figures;
 
 /// Factors of the plant relative to the model of the controller design.
@@ -145,15 +147,23 @@ fn deviating(parameters: &Parameters, deviation: &PlantDeviation) -> Result<Mach
     Ok(changed.machine_config()?)
 }
 
-/// Returns the margins of the worst moving axis: nominal controller on the deviating plant.
+/// Returns the margins of the worst moving axis: nominal controller on the deviating plant, along the path and, with
+/// cross-coupled control, across it.
 fn margins(config: &MachineConfig, figures: &Figures) -> Result<Option<Margins>, TuneError> {
+    let gain = config.contour_gain();
+    let coupled = contour_axes(gain, config.axes().iter());
     let mut loops = Vec::new();
-    for (axis, _) in config.axes().iter().zip(&figures.axes).filter(|(_, figures)| figures.moves) {
+    for (index, axis) in config.axes().iter().enumerate().filter(|(index, _)| figures.axes[*index].moves) {
         let periods = config.periods();
         let named = |source| MachineError::Axis { axis: axis.name().to_owned(), source };
         let nominal = prediction_model(axis, &periods).map_err(named)?;
         let plant = deviating_plant_model(axis, &periods).map_err(named)?;
-        loops.push((plant, design_controller(axis, &nominal)));
+        let along = design_controller(axis, &nominal);
+        if coupled.contains(&index) {
+            let across = along.clone().and_then(|rst| with_contour_gain(&rst, gain));
+            loops.push((plant.clone(), across));
+        }
+        loops.push((plant, along));
     }
     Ok(worst_margins(loops.iter().map(|(plant, rst)| (plant, rst.clone()))))
 }

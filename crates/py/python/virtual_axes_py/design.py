@@ -74,7 +74,7 @@ class FrequencyResponse:
 
 
 def frequency_response(
-    machine: Machine, axis: str, control_loop: Literal["current", "velocity", "position"] = "position"
+    machine: Machine, axis: str, control_loop: Literal["current", "velocity", "position", "contour"] = "position"
 ) -> FrequencyResponse:
     """Computes the frequency response of a control loop of an axis, as `virtual_axes bode` does.
 
