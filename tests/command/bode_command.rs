@@ -33,6 +33,30 @@ fn table_has_every_loop_of_every_axis() {
 }
 
 #[test]
+fn cross_coupled_control_adds_a_loop_of_the_linear_axes() {
+    let with = ["bode", "--set", "contour_control.gain=4"];
+    let found = json(&[with.as_slice(), &["--json"]].concat());
+    for (axis, is_coupled) in [("x", true), ("y", true), ("z", true), ("a", false), ("c", false)] {
+        assert_eq!(found["axes"][axis]["loops"]["contour"].is_object(), is_coupled, "{axis}");
+    }
+    // Across the path the loop has the sum of both gains: that of a position controller with 1.5 + 4 (m/min)/mm.
+    let sum =
+        json(&["bode", "--json", "--axis", "x", "--loop", "position", "--set", "x.position_loop.gain=5.5"]);
+    let modulus = |of: &serde_json::Value, name: &str| {
+        of["axes"]["x"]["loops"][name]["margins"]["modulus"].as_f64().expect("a margin")
+    };
+    let (across, wanted) = (modulus(&found, "contour"), modulus(&sum, "position"));
+    assert!((across / wanted - 1.0).abs() < 1e-9, "{across}, expected {wanted}");
+    assert_rejected(&["bode", "--loop", "contour"], &["--loop contour", "contour_control.gain"]);
+    let only = printed(&[with.as_slice(), &["--loop", "contour", "--axis", "x", "--csv"]].concat());
+    assert!(only.lines().skip(1).all(|line| line.contains(",x,contour,")), "{only}");
+    // The margins of deviating plants are those across the path, too: of the worst axis, y or x.
+    let robust = json(&["robustness", "ballbar", "--json", "--set", "contour_control.gain=4"]);
+    let nominal = robust["nominal"]["margins"]["modulus"].as_f64().expect("a margin");
+    assert!((nominal / across - 1.0).abs() < 0.05 && nominal <= across, "{nominal}, {across}");
+}
+
+#[test]
 fn margins_of_the_position_loop_are_those_of_design() {
     let designed = json(&["design", "p", "--json"]);
     let analyzed = json(&["bode", "--json", "--loop", "position"]);

@@ -10,9 +10,10 @@ use super::tuning::Tuning;
 use super::workload::Workload;
 use virtual_axes_core::config::{AxisConfig, MachineConfig, Parameters};
 use virtual_axes_core::control::Rst;
-use virtual_axes_core::design::{DesignError, Margins, PredictionModel, gpc};
+use virtual_axes_core::design::{DesignError, Margins, PredictionModel, check_stable, gpc};
 use virtual_axes_core::machine::{
-    MachineError, contour_axes, design_controller, prediction_model, with_contour_gain,
+    MachineError, contour_axes, design_contour_controller, design_controller, prediction_model,
+    with_contour_gain,
 };
 use virtual_axes_core::trial::{Figures, TrialError, TrialOutcome};
 use virtual_axes_core::units::POSITION_GAIN;
@@ -60,6 +61,8 @@ pub struct TuningProblem<'a> {
     joints: Vec<String>,
     /// Prediction models of the moving axes.
     models: Vec<PredictionModel>,
+    /// Indices and prediction models of the standing axes on which cross-coupled control can act.
+    standing: Vec<(usize, PredictionModel)>,
     present: TuningCandidate,
 }
 
@@ -88,10 +91,25 @@ impl<'a> TuningProblem<'a> {
                 .map_err(|source| MachineError::Axis { axis: axis.name().to_owned(), source })
         };
         let models = axes.iter().map(model).collect::<Result<Vec<_>, _>>()?;
+        let coupled = contour_axes(f64::MIN_POSITIVE, config.axes().iter()).into_iter();
+        let standing = coupled.filter(|index| !moving.contains(index));
+        let standing = standing
+            .map(|index| Ok((index, model(&&config.axes()[index])?)))
+            .collect::<Result<_, MachineError>>()?;
         let joints = axes.iter().map(|axis| axis.name().to_owned()).collect();
         let present = candidate(Tuning::Present, None, figures, cost, &config);
-        let mut problem =
-            TuningProblem { parameters, workload, cost, progress, config, moving, joints, models, present };
+        let mut problem = TuningProblem {
+            parameters,
+            workload,
+            cost,
+            progress,
+            config,
+            moving,
+            joints,
+            models,
+            standing,
+            present,
+        };
         problem.present.margins = problem.margins(&Tuning::Present);
         Ok(problem)
     }
@@ -155,6 +173,14 @@ impl<'a> TuningProblem<'a> {
             _ => self.config.contour_gain(),
         };
         let coupled = contour_axes(gain, self.config.axes().iter());
+        // A machine whose standing axis is unstable is rejected.
+        let is_stable = |(index, model): &(usize, PredictionModel)| {
+            let across = design_contour_controller(&self.config.axes()[*index], model, gain);
+            across.and_then(|rst| check_stable(model, &rst)).is_ok()
+        };
+        if !coupled.is_empty() && !self.standing.iter().all(is_stable) {
+            return None;
+        }
         let designs = || self.models.iter().zip(&along);
         let across = self
             .moving
