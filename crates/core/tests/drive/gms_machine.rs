@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
+use proptest::prelude::*;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::machine::{Machine, MachineParameters, SimdWidth};
 use virtual_axes_verification::fixtures::machines::{AXES, configured_with};
 
 use crate::bits::{assert_bits_of_every_width_and_part, bits, psec};
+use crate::parameter_ranges::run_demanding_setpoints;
 use crate::transmission::ELASTIC_X;
 
 const X: usize = 0;
@@ -120,5 +122,40 @@ fn a_held_axis_gives_way_under_a_load_and_returns_to_the_same_point() {
         assert!((there / exact - 1.0).abs() < 0.01, "{there} m, not {exact} m");
         assert!((back - exact_back).abs() < 0.01 * exact, "{back} m, not {exact_back} m");
         assert!((again / there - 1.0).abs() < 1e-4, "{again} m, not {there} m");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn elements_over_the_whole_range_have_finite_signals(
+        is_elastic in prop::bool::ANY,
+        count in 1..=10_usize,
+        stiffness in -9.0..6.0_f64,
+        attraction in prop::option::of(-9.0..12.0_f64),
+        friction in prop_oneof![Just(0.0), 1e-9..10_f64, Just(1e4)],
+        stribeck in prop_oneof![Just(0.0), 1e-9..10_f64],
+        period_us in prop::sample::select(vec![25.0, 125.0, 1000.0]),
+    ) {
+        let mut changes = vec![
+            format!("x.friction.presliding_stiffness_n_um={}", 10_f64.powf(stiffness)),
+            format!("x.friction.presliding_elements={count}"),
+            format!("x.friction.presliding_attraction_n_s={}", attraction.map_or(0.0, |power| 10_f64.powf(power))),
+            format!("x.friction.a={friction}"),
+            "x.friction.c=0".to_owned(),
+            format!("x.friction.stribeck={stribeck}"),
+            format!("periods.current_us={period_us}"),
+            format!("periods.velocity_us={period_us}"),
+            "periods.position_ms=6".to_owned(),
+        ];
+        if is_elastic {
+            changes.extend(ELASTIC_X.map(str::to_owned));
+        }
+        let config = machine(&changes.iter().map(String::as_str).collect::<Vec<_>>());
+        // Loops that are too slow for the cycles are rejected.
+        if let Ok(parameters) = MachineParameters::new(&config) {
+            run_demanding_setpoints(&mut Machine::new(Arc::new(parameters)), &|| format!("{changes:?}"));
+        }
     }
 }

@@ -35,7 +35,7 @@ fn elements_need_a_stiffness_and_have_no_damping() {
     );
     assert_eq!(
         rejection(&[STIFFNESS, "x.friction.presliding_elements=11"]),
-        "test: x.friction.presliding_elements = 11: must be from 0 to 10"
+        "test: x.friction.presliding_elements = 11: must lie in 0 … 10"
     );
 }
 
