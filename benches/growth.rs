@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use virtual_axes_core::assess::AxisAssessor;
-use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::config::{MachineConfig, ValueSource, parse_assignment};
 use virtual_axes_core::machine::{Machine, MachineParameters};
 use virtual_axes_core::trial::{self, Figures, GridSource, Measures, SetpointSource, SourceError, Trial};
 use virtual_axes_core::units::seconds;
@@ -183,12 +183,12 @@ fn transmissions(rigid: &MachineConfig) {
     let rotary = ["a", "c"].map(|axis| (format!("{axis}.friction.presliding_stiffness_nm_rad"), 3e6));
     let bristles: Vec<(String, f64)> = linear.into_iter().chain(rotary).collect();
     let presliding = parameters(&bristles).machine_config().expect("a machine");
-    let slip = |count: i64| {
+    let slip = |count: usize| {
         let mut machine = parameters(&bristles);
-        let assignments = ["x", "y", "z", "a", "c"].map(|axis| Assignment {
-            key: format!("{axis}.friction.presliding_elements"),
-            value: Value::Integer(count),
-            source: ValueSource::named("benchmark"),
+        let source = ValueSource::named("benchmark");
+        let assignments = ["x", "y", "z", "a", "c"].map(|axis| {
+            parse_assignment(&format!("{axis}.friction.presliding_elements={count}"), &source)
+                .expect("an assignment")
         });
         machine.set_all(assignments.into()).expect("values in their ranges");
         machine.machine_config().expect("a machine")

@@ -117,14 +117,19 @@ pub struct MaxwellSlip {
     viscosity: f64,
     /// q, rad/(N·m).
     angle_per_torque: f64,
+    /// 1/q.
+    torque_per_angle: f64,
 }
 
-/// Element over a tick, with signs in the direction of the displacement.
+/// Element over a tick, with signs in one direction.
 #[derive(Clone, Copy, Default)]
-struct DirectedElement {
+struct Directed {
     stiffness: f64,
     force: f64,
+    /// Largest force in the direction.
     limit: f64,
+    /// Largest force in the opposite direction.
+    opposite_limit: f64,
     /// True for an element that goes on to slip.
     slips: bool,
     /// True for an element at its limit at the end of the tick.
@@ -151,6 +156,7 @@ impl MaxwellSlip {
             attraction: attraction.map_or(f64::INFINITY, |attraction| attraction * period),
             viscosity: angle_per_torque * viscosity / period,
             angle_per_torque,
+            torque_per_angle: 1.0 / angle_per_torque,
         }
     }
 
@@ -184,73 +190,73 @@ impl MaxwellSlip {
     ///
     /// `free` is the displacement without friction, `law` is q g (not negative), both in rad at the motor; `speed` is that
     /// of the motor at the start of the tick, rad/s.
+    #[inline]
     pub fn step(&self, free: f64, law: f64, speed: f64, state: &mut MaxwellSlipState) -> f64 {
-        let law = law / self.angle_per_torque;
+        let law = law * self.torque_per_angle;
         let weight = match self.attraction {
             attraction if attraction.is_infinite() => 1.0,
             attraction => attraction / (law + attraction),
         };
-        // Limit of a force towards a direction, and true for an element that slips there, all with signs in it.
-        let limit = |level: f64, force: f64, is_slipping: bool, speed: f64| {
-            let slips = is_slipping && force > 0.0 && speed > 0.0;
-            match force > level {
-                // Without motion towards its force the element sticks.
-                true if speed <= 0.0 => (force, false),
-                true => (force + (level - force) * weight, slips),
-                false if slips => (force + (level - force) * weight, true),
-                false => (level, false),
-            }
-        };
-        let mut limits = [[(0.0, false); 2]; MAX_ELEMENTS];
-        let mut forces = [0.0; MAX_ELEMENTS];
-        let mut at_start = 0.0;
-        for k in 0..self.count {
-            let (level, force, is_slipping) =
-                (self.elements[k].share * law, state.forces[k], state.is_slipping[k]);
-            limits[k] = [limit(level, force, is_slipping, speed), limit(level, -force, is_slipping, -speed)];
-            forces[k] = force.max(-limits[k][1].0).min(limits[k][0].0);
-            at_start += forces[k];
-        }
-        let is_forward = free > self.angle_per_torque * at_start;
-        let directed = |value: f64| if is_forward { value } else { -value };
-        let mut elements = [DirectedElement::default(); MAX_ELEMENTS];
-        for k in 0..self.count {
-            let (limit, slips) = limits[k][usize::from(!is_forward)];
-            let stiffness = self.elements[k].stiffness;
-            elements[k] =
-                DirectedElement { stiffness, force: directed(forces[k]), limit, slips, is_limited: false };
-        }
+        // Signs in the direction of the motion. An axis at rest has none, and its elements stick.
+        let (along, moves) = (if speed < 0.0 { -1.0 } else { 1.0 }, speed != 0.0);
+        let mut elements = [Directed::default(); MAX_ELEMENTS];
         let elements = &mut elements[..self.count];
-        let size = self.solve(elements, directed(free));
+        let mut sum = 0.0;
+        for (k, directed) in elements.iter_mut().enumerate() {
+            let MaxwellSlipElement { stiffness, share } = self.elements[k];
+            let (level, force) = (share * law, along * state.forces[k]);
+            let relaxed = force + (level - force) * weight;
+            let is_above = force > level;
+            let slips = moves && state.is_slipping[k] && force > 0.0;
+            *directed = Directed {
+                stiffness,
+                force: if moves && is_above { relaxed } else { force },
+                limit: if moves && (is_above || slips) { relaxed } else { level.max(force) },
+                opposite_limit: level.max(-force),
+                slips,
+                is_limited: false,
+            };
+            sum += directed.force;
+        }
+        let is_along = along * free > self.angle_per_torque * sum;
+        if !is_along {
+            for element in elements.iter_mut() {
+                *element = Directed {
+                    force: -element.force,
+                    limit: element.opposite_limit,
+                    slips: false,
+                    ..*element
+                };
+            }
+        }
+        let direction = if is_along { along } else { -along };
+        let size = self.solve(elements, direction * free);
         for (k, element) in elements.iter().enumerate() {
             let spring = element.force + element.stiffness * size;
             let force = if element.is_limited { element.limit } else { spring.min(element.limit) };
-            state.forces[k] = directed(force);
+            state.forces[k] = direction * force;
             state.is_slipping[k] = element.is_limited || element.slips;
         }
-        free - directed(size)
+        free - direction * size
     }
 
     /// Returns the size of the displacement, and marks the elements at their limit; `free` is the displacement without
     /// friction, in the direction of the displacement.
-    fn solve(&self, elements: &mut [DirectedElement], free: f64) -> f64 {
+    #[inline]
+    fn solve(&self, elements: &mut [Directed], free: f64) -> f64 {
+        let q = self.angle_per_torque;
         loop {
             let (mut force, mut stiffness) = (0.0, 0.0);
             for element in &*elements {
-                match element.is_limited {
-                    true => force += element.limit,
-                    false => {
-                        force += element.force;
-                        stiffness += element.stiffness;
-                    }
-                }
+                force += if element.is_limited { element.limit } else { element.force };
+                stiffness += if element.is_limited { 0.0 } else { element.stiffness };
             }
-            let q = self.angle_per_torque;
             let size = ((free - q * force) / (1.0 + self.viscosity + q * stiffness)).max(0.0);
             let mut is_solved = true;
-            for element in elements.iter_mut().filter(|element| !element.is_limited) {
-                element.is_limited = element.limit - element.force < element.stiffness * size;
-                is_solved &= !element.is_limited;
+            for element in elements.iter_mut() {
+                let is_beyond = element.limit - element.force < element.stiffness * size;
+                is_solved &= element.is_limited || !is_beyond;
+                element.is_limited |= is_beyond;
             }
             if is_solved {
                 return size;
