@@ -37,7 +37,7 @@ pub(super) struct Elements<const L: usize> {
 }
 
 impl<const L: usize> Elements<L> {
-    /// Returns the elements of axes without.
+    /// Creates the elements of a block whose axes have none.
     pub fn none() -> Self {
         Elements { models: [const { None }; L], states: [MaxwellSlipState::default(); L], is_present: false }
     }
