@@ -1,22 +1,23 @@
 #!/usr/bin/env python3
-"""Writes crates/core/tests/golden/gms.csv: the generalized Maxwell-slip friction model with stick and slip located as events.
+"""Writes crates/core/tests/golden/gms.csv: the generalized Maxwell-slip friction model with events located.
 
     pip install scipy==1.17.1
     python tools/golden_gms.py
 
 Nothing here is taken from the library. The equations are those of Al-Bender, Lampaert and Swevers, "The generalized
 Maxwell-slip model: a novel model for friction simulation and compensation", IEEE Transactions on Automatic Control 50
-(2005). No table of parameters from a publication on this model could be cited with certainty: friction law and mass are those of
-table 1 of Canudas de Wit, Olsson, Åström and Lischinsky, IEEE Transactions on Automatic Control 40 (1995), and the elements
-and their attraction are of our own. Between two events the equations are solved by an explicit Runge-Kutta method of order 8
-with tolerances of 1e-11; events are the start of slip of an element and the reversal of the velocity.
+(2005). No table of parameters from a publication on this model could be cited with certainty: friction law and mass are
+those of table 1 of Canudas de Wit, Olsson, Åström and Lischinsky, IEEE Transactions on Automatic Control 40 (1995), and
+the elements and their attraction are chosen for this test. Between two events the equations are solved by an explicit
+Runge-Kutta method of order 8 with tolerances of 1e-11; events are the start of slip of an element and the reversal of
+the velocity.
 
 Columns: case, time (s), position (m), velocity (m/s), friction force (N). Cases: 0, presliding: a force with two
 frequencies, at most 91 % of the breakaway force, on a mass of 1 kg, with a viscous friction of 200 N/(m/s), since
 elements that stick have no damping; 1, stick-slip: a spring of 200 N/m, whose end moves at 1 mm/s, pulls the mass, with
-40 N/(m/s); 2, frictional lag: the velocity is a sine around 1.5 mm/s, without reversals, with 0.4 N/(m/s);
-3, case 1, in which the force of a slipping element grows at most as fast as that of its spring. Without this limit a slider
-can move along the motion faster than the mass and supply energy.
+40 N/(m/s); 2, frictional lag: the velocity is a sine around 1.5 mm/s, without reversals, with 0.4 N/(m/s); 3, case 1, in
+which the force of a slipping element grows at most as fast as that of its spring. Without this limit a slider can move
+along the motion faster than the mass and supply energy.
 """
 
 import math
