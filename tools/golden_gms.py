@@ -15,9 +15,9 @@ the velocity.
 Columns: case, time (s), position (m), velocity (m/s), friction force (N). Cases: 0, presliding: a force with two
 frequencies, at most 91 % of the breakaway force, on a mass of 1 kg, with a viscous friction of 200 N/(m/s), since
 elements that stick have no damping; 1, stick-slip: a spring of 200 N/m, whose end moves at 1 mm/s, pulls the mass, with
-40 N/(m/s); 2, frictional lag: the velocity is a sine around 1.5 mm/s, without reversals, with 0.4 N/(m/s); 3, case 1, in
-which the force of a slipping element grows at most as fast as that of its spring. Without this limit a slider can move
-along the motion faster than the mass and supply energy.
+40 N/(m/s); 2, frictional lag: the velocity is a sine around 1.5 mm/s, without reversals, with 0.4 N/(m/s); 3, case 1,
+in which the force of a slipping element grows at most as fast as that of its spring. Without this limit a slider can
+move along the motion faster than the mass and supply energy.
 """
 
 import math
