@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use virtual_axes_core::assess::AxisAssessor;
-use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::config::{MachineConfig, ValueSource, parse_assignment};
 use virtual_axes_core::machine::{Machine, MachineParameters};
 use virtual_axes_core::trial::{self, Figures, GridSource, Measures, SetpointSource, SourceError, Trial};
 use virtual_axes_core::units::seconds;
@@ -166,7 +166,8 @@ fn axes(config: &MachineConfig) {
     table("axes: one machine, figures of the axes", "axes", [1, 2, 4, 5, 8, 16, 32].map(row).into());
 }
 
-/// Measures the default machine with rigid and with elastic transmissions on all axes, with presliding, and with backlash.
+/// Measures the default machine with rigid and with elastic transmissions on all axes, with presliding (LuGre and
+/// generalized Maxwell-slip model), and with backlash.
 fn transmissions(rigid: &MachineConfig) {
     let linear = ["x", "y", "z"].into_iter().flat_map(|axis| {
         [("stiffness_n_um", 200.0), ("damping_n_s_m", 15_000.0), ("load_mass_kg", 300.0)]
@@ -182,6 +183,17 @@ fn transmissions(rigid: &MachineConfig) {
     let rotary = ["a", "c"].map(|axis| (format!("{axis}.friction.presliding_stiffness_nm_rad"), 3e6));
     let bristles: Vec<(String, f64)> = linear.into_iter().chain(rotary).collect();
     let presliding = parameters(&bristles).machine_config().expect("a machine");
+    let slip = |count: usize| {
+        let mut machine = parameters(&bristles);
+        let source = ValueSource::named("benchmark");
+        let assignments = ["x", "y", "z", "a", "c"].map(|axis| {
+            parse_assignment(&format!("{axis}.friction.presliding_elements={count}"), &source)
+                .expect("an assignment")
+        });
+        machine.set_all(assignments.into()).expect("values in their ranges");
+        machine.machine_config().expect("a machine")
+    };
+    let (slip_4, slip_10) = (slip(4), slip(10));
     let linear = ["x", "y", "z"].map(|axis| (format!("{axis}.transmission.backlash_um"), 10.0));
     let rotary = ["a", "c"].map(|axis| (format!("{axis}.transmission.backlash_deg"), 0.005));
     let shares = ["x", "y", "z", "a", "c"].map(|axis| (format!("{axis}.transmission.load_friction"), 0.7));
@@ -192,6 +204,8 @@ fn transmissions(rigid: &MachineConfig) {
         axes_row("rigid", rigid, AXES),
         axes_row("elastic", &elastic, AXES),
         axes_row("presliding", &presliding, AXES),
+        axes_row("presliding, 4 elements", &slip_4, AXES),
+        axes_row("presliding, 10 elements", &slip_10, AXES),
         axes_row("elastic, presliding", &both, AXES),
         axes_row("elastic, backlash", &backlash, AXES),
     ];

@@ -31,6 +31,8 @@ pub(crate) fn base_unit(name: &str) -> Option<&'static str> {
         "mH" => r#"kg="1" m="2" s="-2" A="-2" factor="0.001""#,
         "N" => r#"kg="1" m="1" s="-2""#,
         "N·m" => r#"kg="1" m="2" s="-2""#,
+        "N/s" => r#"kg="1" m="1" s="-3""#,
+        "N·m/s" => r#"kg="1" m="2" s="-3""#,
         "N/A" => r#"kg="1" m="1" s="-2" A="-1""#,
         "N·m/A" => r#"kg="1" m="2" s="-2" A="-1""#,
         "V·s/m" => r#"kg="1" m="1" s="-2" A="-1""#,

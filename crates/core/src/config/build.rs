@@ -21,8 +21,8 @@ use super::plant::{
     TransmissionConfig,
 };
 use super::plant_keys::{
-    backlash_suffix, compensation_suffix, gap_unit, presliding_suffixes, stiffness_unit, structure_suffix,
-    transmission_suffixes,
+    PRESLIDING_ELEMENTS, attraction_suffix, backlash_suffix, compensation_suffix, gap_unit,
+    presliding_suffixes, stiffness_unit, structure_suffix, transmission_suffixes,
 };
 use super::value::Value;
 use crate::units::{
@@ -331,9 +331,13 @@ impl AxisParameters<'_> {
     fn presliding(&self) -> Result<Option<PreslidingConfig>, ConfigError> {
         let [stiffness, damping] = presliding_suffixes(self.joint.axis);
         let (stiffness, ratio) = (self.or_zero(stiffness), self.transmission_ratio()?);
+        let elements = self.count(PRESLIDING_ELEMENTS)?;
+        let attraction = self.or_zero(attraction_suffix(self.joint.axis));
         Ok((stiffness > 0.0).then(|| PreslidingConfig {
             stiffness: stiffness * stiffness_unit(self.joint.axis) * ratio * ratio,
             damping: self.or_zero(damping) * ratio * ratio,
+            elements,
+            attraction: (attraction > 0.0).then_some(attraction * ratio),
         }))
     }
 

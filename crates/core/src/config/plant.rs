@@ -78,13 +78,23 @@ pub struct StribeckConfig {
     pub viscous: f64,
 }
 
-/// Presliding of the friction (LuGre model), in units of the motor.
+/// Presliding of the friction (LuGre or generalized Maxwell-slip model), in units of the motor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PreslidingConfig {
-    /// Stiffness σ0 of the bristles, N·m/rad (N/m for a linear motor).
+    /// Stiffness σ0, N·m/rad (N/m for a linear motor).
     pub stiffness: f64,
-    /// Damping σ1 of the bristles, N·m·s/rad (N·s/m for a linear motor).
+    /// Damping σ1 of the bristles of the LuGre model, N·m·s/rad (N·s/m for a linear motor).
     pub damping: f64,
+    /// Number of elements of the generalized Maxwell-slip model; 0 for the LuGre model.
+    pub elements: usize,
+    /// Attraction C of slipping elements, N·m/s (N/s for a linear motor); `None` if they follow the friction law at once.
+    pub attraction: Option<f64>,
+}
+
+impl PreslidingConfig {
+    /// LuGre model with a stiffness and a damping of 0.
+    pub const NONE: PreslidingConfig =
+        PreslidingConfig { stiffness: 0.0, damping: 0.0, elements: 0, attraction: None };
 }
 
 /// Gravity torque at the motor, r·(weight + tilt·sin(position + phase)).

@@ -8,7 +8,8 @@ use super::error::{ConfigError, ValueSource};
 use super::layout::JointVariant;
 use super::machine::AxisKind;
 use super::plant_keys::{
-    backlash_suffix, compensation_suffix, presliding_suffixes, structure_suffix, transmission_suffixes,
+    PRESLIDING_ELEMENTS, attraction_suffix, backlash_suffix, compensation_suffix, presliding_suffixes,
+    structure_suffix, transmission_suffixes,
 };
 use super::value::{Value, number_text};
 use crate::units::{MILLIMETER, Rounded};
@@ -138,6 +139,22 @@ impl CrossChecks<'_> {
         let is_given = |key: &str| self.number(key).is_some_and(|value| value > 0.0);
         if is_given(&damping) && !is_given(&stiffness) {
             return Err(missing(origin, &stiffness, format!("expected it above 0 beside {damping}")));
+        }
+        let elements = format!("{}.{PRESLIDING_ELEMENTS}", joint.name);
+        let attraction = format!("{}.{}", joint.name, attraction_suffix(joint.axis));
+        let has_elements = matches!(self.value(&elements), Some(Value::Integer(count)) if count > 0);
+        if has_elements && !is_given(&stiffness) {
+            return Err(missing(origin, &stiffness, format!("expected it above 0 beside {elements}")));
+        }
+        if has_elements && is_given(&damping) {
+            let reason = "the generalized Maxwell-slip model has no damping";
+            return Err(self.rejection(
+                &[&elements, &damping],
+                format!("not be given together: {elements} and {damping}; {reason}"),
+            ));
+        }
+        if is_given(&attraction) && !has_elements {
+            return Err(missing(origin, &elements, format!("expected it above 0 beside {attraction}")));
         }
         let a_key = format!("{}.friction.a", joint.name);
         let c_key = format!("{}.friction.c", joint.name);

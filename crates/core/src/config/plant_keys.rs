@@ -57,6 +57,17 @@ pub(super) fn presliding_suffixes(axis: AxisKind) -> [&'static str; 2] {
     }
 }
 
+/// Key of the number of elements of the presliding, without the name of the axis.
+pub(super) const PRESLIDING_ELEMENTS: &str = "friction.presliding_elements";
+
+/// Returns the key of the attraction of the elements of the presliding, without the name of the axis.
+pub(super) fn attraction_suffix(axis: AxisKind) -> &'static str {
+    match axis {
+        AxisKind::Linear => "friction.presliding_attraction_n_s",
+        AxisKind::Rotary => "friction.presliding_attraction_nm_s",
+    }
+}
+
 /// Returns the unit of a stiffness at an axis, N/m or N·m/rad.
 pub(super) fn stiffness_unit(axis: AxisKind) -> f64 {
     match axis {

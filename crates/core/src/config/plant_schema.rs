@@ -1,6 +1,6 @@
 //! Schema of the plant parameters: transmission, motor, friction and gravity of an axis.
 
-use super::definition::DefaultValue::Number;
+use super::definition::DefaultValue::{Integer, Number};
 use super::definition::MotorKind::{Linear as LinearMotor, Rotary as RotaryMotor};
 use super::definition::{ParameterDefinition, ParameterKind};
 use super::machine::AxisKind::{Linear, Rotary};
@@ -187,6 +187,18 @@ pub(super) const PLANT: &[ParameterDefinition] = &[
         .on(Rotary)
         .default(Number(0.0))
         .describe("Damping σ1 of the friction before the axis slides (LuGre model), at the axis; needs a presliding stiffness."),
+    ParameterDefinition::new("friction.presliding_elements", "", ParameterKind::Integer { min: 0, max: 10 })
+        .of_axis()
+        .default(Integer(0))
+        .describe("Number of elements of the friction before the axis slides (generalized Maxwell-slip model), which have the first loading curve of the LuGre model; 0: LuGre model; needs a presliding stiffness."),
+    ParameterDefinition::number("friction.presliding_attraction_n_s", "N/s", 0.0, 1e12)
+        .on(Linear)
+        .default(Number(0.0))
+        .describe("Attraction C, rate at which the friction of a sliding axis follows its law after a change of speed, along the axis; 0: at once; needs presliding elements."),
+    ParameterDefinition::number("friction.presliding_attraction_nm_s", "N·m/s", 0.0, 1e12)
+        .on(Rotary)
+        .default(Number(0.0))
+        .describe("Attraction C, rate at which the friction of a sliding axis follows its law after a change of speed, at the axis; 0: at once; needs presliding elements."),
     // Gravity.
     ParameterDefinition::number("gravity.weight_n", "N", -1e6, 1e6)
         .on(Linear)

@@ -1,7 +1,8 @@
 //! Plant of one axis: motor, friction, gravity and load.
 
 use super::{
-    DriveError, Friction, Gravity, GravityExpansion, LoadState, Motor, MotorState, Presliding, Transmission,
+    DriveError, Friction, Gravity, GravityExpansion, LoadState, MaxwellSlip, MaxwellSlipState, Motor,
+    MotorState, Presliding, Transmission,
 };
 use crate::config::{AxisConfig, MotorConfig, PreslidingConfig, TransmissionConfig};
 use crate::simd::{SimdReal, clamp_abs, soa_struct};
@@ -56,6 +57,7 @@ impl Plant {
                 let scaled = PreslidingConfig {
                     stiffness: presliding.stiffness * deviation.friction,
                     damping: presliding.damping * deviation.friction,
+                    ..*presliding
                 };
                 (law, Presliding::new(&scaled, viscosity / speed_per_torque, period, per_torque))
             }
@@ -106,15 +108,46 @@ impl Plant {
         voltage: f64,
         load: f64,
     ) -> Torques {
+        let deflection = self.presliding.is_present().then_some(deflection);
+        self.step_with_memory(s, load_state, deflection, [voltage, load], |_, lugre| lugre)
+    }
+
+    /// Steps the plant of an axis with the elements `friction` by one tick; see [`step_with_load`](Self::step_with_load).
+    pub fn step_with_maxwell_slip(
+        &self,
+        s: &mut MotorState,
+        load_state: &mut LoadState,
+        (friction, state): (&MaxwellSlip, &mut MaxwellSlipState),
+        voltage: f64,
+        load: f64,
+    ) -> Torques {
+        let speed = s.speed;
+        let memory = |[displacement, law]: [f64; 2], _| (friction.step(displacement, law, speed, state), 0.0);
+        self.step_with_memory(s, load_state, Some(&mut 0.0), [voltage, load], memory)
+    }
+
+    /// Steps the plant by one tick under a voltage and a load; see [`step_rigid`](Self::step_rigid).
+    fn step_with_memory(
+        &self,
+        s: &mut MotorState,
+        load_state: &mut LoadState,
+        deflection: Option<&mut f64>,
+        [voltage, load]: [f64; 2],
+        memory: impl FnOnce([f64; 2], (f64, f64)) -> (f64, f64),
+    ) -> Torques {
         let gravity = self.gravity_torque(s.angle - load_state.wind_up);
         let load = self.load_torque(load);
         let inputs = [voltage, load - gravity, self.friction_speed_drop.bound(s.speed)];
-        let deflection = self.presliding.is_present().then_some(deflection);
         let speed_drop = match self.transmission.is_elastic() {
-            true => self.step_elastic(s, load_state, deflection, inputs),
-            false => self.step_rigid(s, deflection, inputs),
+            true => self.step_elastic(s, load_state, deflection, inputs, memory),
+            false => self.step_rigid(s, deflection, inputs, memory),
         };
         Torques { friction: self.torque_from_speed_drop(speed_drop), gravity, load }
+    }
+
+    /// Returns the change of θ over one tick per torque at the motor, rad/(N·m).
+    pub fn angle_per_torque(&self) -> f64 {
+        self.motor.angle_per_torque()
     }
 
     /// Returns position, velocity (m, m/s or rad, rad/s) and current (A) of the axis: those of the load with an elastic
@@ -200,12 +233,17 @@ impl<N: SimdReal> Plant<N> {
 
     /// Steps a rigid plant by one tick under a voltage, a torque and a bound of friction, as
     /// [`step_with_torques`](Self::step_with_torques), with presliding if there is a `deflection`.
+    ///
+    /// `memory` returns the displacement by friction and the deflection at the end of the tick, from the displacement without
+    /// friction, that by the friction law (rad), and the result of the bristles; it replaces the latter in the lanes with
+    /// another model.
     #[inline(always)]
     pub(crate) fn step_rigid(
         &self,
         s: &mut MotorState<N>,
         deflection: Option<&mut N>,
         [voltage, external, max_speed_drop]: [N; 3],
+        memory: impl FnOnce([N; 2], (N, N)) -> (N, N),
     ) -> N {
         let free = self.motor.step(s, voltage, external);
         let stopping = clamp_abs(free.speed, max_speed_drop);
@@ -213,7 +251,7 @@ impl<N: SimdReal> Plant<N> {
             None => stopping,
             Some(deflection) => {
                 let displacement = self.motor.displacement(s, voltage, external);
-                self.sliding(displacement, max_speed_drop, deflection, stopping)
+                self.sliding([displacement, max_speed_drop], deflection, stopping, memory)
             }
         };
         *s = self.motor.brake(&free, speed_drop);
@@ -229,6 +267,7 @@ impl<N: SimdReal> Plant<N> {
         load: &mut LoadState<N>,
         deflection: Option<&mut N>,
         [voltage, external, max_speed_drop]: [N; 3],
+        memory: impl FnOnce([N; 2], (N, N)) -> (N, N),
     ) -> N {
         let presliding = match deflection {
             Some(_) => self.presliding.stiffness,
@@ -238,7 +277,7 @@ impl<N: SimdReal> Plant<N> {
             let stopping = clamp_abs(free.speed, max_speed_drop);
             match deflection {
                 None => stopping,
-                Some(deflection) => self.sliding(free.angle, max_speed_drop, deflection, stopping),
+                Some(deflection) => self.sliding([free.angle, max_speed_drop], deflection, stopping, memory),
             }
         };
         let inputs = [voltage, external, presliding];
@@ -246,11 +285,19 @@ impl<N: SimdReal> Plant<N> {
     }
 
     /// Returns the speed drop by friction with presliding over a tick (rad/s) from the displacement without friction
-    /// (rad), and changes the deflection; the speed drop is `stopping` in the lanes without presliding.
+    /// (rad), and changes the deflection; the speed drop is `stopping` in the lanes without presliding. See
+    /// [`step_rigid`](Self::step_rigid).
     #[inline(always)]
-    fn sliding(&self, displacement: N, max_speed_drop: N, deflection: &mut N, stopping: N) -> N {
+    fn sliding(
+        &self,
+        [displacement, max_speed_drop]: [N; 2],
+        deflection: &mut N,
+        stopping: N,
+        memory: impl FnOnce([N; 2], (N, N)) -> (N, N),
+    ) -> N {
         let law = self.motor.displacement_by_speed_drop(max_speed_drop);
-        let (by_friction, next) = self.presliding.step(displacement, law, *deflection);
+        let bristles = self.presliding.step(displacement, law, *deflection);
+        let (by_friction, next) = memory([displacement, law], bristles);
         let is_present = law.splat(0.0).simd_lt(self.presliding.stiffness);
         *deflection = next.select(is_present, *deflection);
         self.motor.speed_drop_by_displacement(by_friction).select(is_present, stopping)

@@ -11,7 +11,7 @@ use crate::control::{
     BacklashCompensation, BacklashOffset, CONTOUR_LOOKBACK, CurrentFilters, Delays, Feedforward, Pi, PiState,
     PositionController, PositionState, SetpointHistory, SetpointWindow, TickDelay,
 };
-use crate::drive::{ContactState, EventDrivenTransmission, LoadState, MotorState, Plant};
+use crate::drive::{ContactState, EventDrivenTransmission, LoadState, MaxwellSlip, MotorState, Plant};
 use crate::state_codec::StateCodec;
 use crate::units::seconds;
 
@@ -27,6 +27,8 @@ pub struct AxisParameters {
     pub(super) loops: InnerLoops,
     /// Transmission with backlash, friction at the load or a structure.
     pub(super) event_driven: Option<Arc<EventDrivenTransmission>>,
+    /// Elements of the friction (generalized Maxwell-slip model).
+    pub(super) elements: Option<Arc<MaxwellSlip>>,
     position: PositionController,
     controller: &'static str,
     feedforward: Feedforward,
@@ -91,9 +93,10 @@ impl AxisParameters {
         // Without friction compensation its delay does not count.
         let delays = Delays { friction: if compensation.is_some() { delays.friction } else { 0 }, ..delays };
         let velocity_scale = 1.0 / motor.torque_constant;
+        let plant = Plant::new(axis, tick)?;
         Ok(AxisParameters {
             loops: InnerLoops {
-                plant: Plant::new(axis, tick)?,
+                plant,
                 velocity: Pi::new(
                     &axis.velocity_loop,
                     seconds(periods.velocity),
@@ -104,6 +107,7 @@ impl AxisParameters {
                 current: Pi::new(&axis.current_loop, tick, 1.0, motor.max_voltage),
             },
             event_driven: EventDrivenTransmission::new(axis, tick)?.map(Arc::new),
+            elements: MaxwellSlip::of_axis(axis, &plant, tick).map(Arc::new),
             backlash_compensation: BacklashCompensation::new(axis, seconds(periods.position)),
             position,
             controller,

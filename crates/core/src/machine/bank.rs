@@ -9,7 +9,7 @@ use super::inner_loops::{
     Aligned, AxisBlock, CycleStatistics, CycleTicks, InnerLoopInputs, InnerLoopState, InnerLoops, TickRecord,
     TickSpan,
 };
-use crate::drive::{EventDrivenTransmission, LoadState};
+use crate::drive::{EventDrivenTransmission, LoadState, MaxwellSlip};
 use crate::state_codec::StateCodec;
 
 /// Lanes of the small block, used for up to four axes if the widest vector of the processor has at most four lanes:
@@ -113,6 +113,18 @@ impl AxisBank {
         with_lane!(&mut self.blocks, axis, block_and_lane_mut, |block, lane| {
             block.set_event_driven(lane, transmission);
         });
+    }
+
+    /// Sets the elements of the friction of an axis.
+    pub fn set_elements(&mut self, axis: usize, elements: Option<Arc<MaxwellSlip>>) {
+        with_lane!(&mut self.blocks, axis, block_and_lane_mut, |block, lane| {
+            block.set_elements(lane, elements);
+        });
+    }
+
+    /// Sets the forces of the elements of the friction of an axis to 0.
+    pub fn reset_elements(&mut self, axis: usize) {
+        with_lane!(&mut self.blocks, axis, block_and_lane_mut, |block, lane| block.reset_elements(lane));
     }
 
     /// Returns the state of an axis.

@@ -9,9 +9,11 @@ use std::sync::Arc;
 
 use pulp::Simd;
 
+use super::elements::Elements;
 use crate::control::{CurrentFilterState, CurrentFilters, Pi, PiState};
 use crate::drive::{
-    ContactState, EventDrivenTransmission, FrictionExpansion, GravityExpansion, LoadState, MotorState, Plant,
+    ContactState, EventDrivenTransmission, FrictionExpansion, GravityExpansion, LoadState, MaxwellSlip,
+    MaxwellSlipState, MotorState, Plant,
 };
 use crate::simd::{SimdLoad, SimdReal, Unroll2, Vector, soa_struct};
 use crate::state_codec::StateCodec;
@@ -201,6 +203,7 @@ struct TickStart<const L: usize> {
     friction_expansion: Aligned<FrictionExpansion<[f64; L]>>,
     gravity_expansion: Aligned<GravityExpansion<[f64; L]>>,
     span_state: Aligned<SpanState<[f64; L]>>,
+    elements: Elements<L>,
 }
 
 /// Parameters, inputs, state and results of `L` axes, one per SIMD lane.
@@ -225,6 +228,8 @@ pub(super) struct AxisBlock<const L: usize> {
     event_driven: [Option<Arc<EventDrivenTransmission>>; L],
     /// True if there is an event-driven transmission.
     has_event_driven_axis: bool,
+    /// Elements of the friction of the axes with the generalized Maxwell-slip model.
+    elements: Elements<L>,
     /// True if the friction of any axis has presliding.
     has_presliding: bool,
     /// True if the friction law of any axis has a Stribeck or viscous term.
@@ -258,6 +263,7 @@ impl<const L: usize> AxisBlock<L> {
             has_elastic_axis: false,
             event_driven: [const { None }; L],
             has_event_driven_axis: false,
+            elements: Elements::none(),
             has_presliding: false,
             has_stribeck_terms: false,
             has_filters: false,
@@ -294,6 +300,7 @@ impl<const L: usize> AxisBlock<L> {
         code!(self.gravity_expansion);
         code!(self.statistics);
         code!(self.span_state);
+        self.elements.code(lane, codec);
         let rows = codec.integer(self.compensation.len() as u64, ticks.velocity_cycles() as u64) as usize;
         let records = codec.integer(self.records.len() as u64, ticks.position as u64) as usize;
         // Another axis of the block can have more rows.
@@ -330,6 +337,7 @@ impl<const L: usize> AxisBlock<L> {
             friction_expansion: self.friction_expansion.clone(),
             gravity_expansion: self.gravity_expansion.clone(),
             span_state: self.span_state.clone(),
+            elements: self.elements.clone(),
         });
     }
 
@@ -340,6 +348,7 @@ impl<const L: usize> AxisBlock<L> {
             self.friction_expansion.clone_from(&start.friction_expansion);
             self.gravity_expansion.clone_from(&start.gravity_expansion);
             self.span_state.clone_from(&start.span_state);
+            self.elements.clone_from(&start.elements);
         }
     }
 
@@ -366,6 +375,16 @@ impl<const L: usize> AxisBlock<L> {
     pub fn set_event_driven(&mut self, lane: usize, transmission: Option<Arc<EventDrivenTransmission>>) {
         self.event_driven[lane] = transmission;
         self.has_event_driven_axis = self.event_driven.iter().any(Option::is_some);
+    }
+
+    /// Sets the elements of the friction of a lane, in place of the bristles of its plant, and keeps their forces.
+    pub fn set_elements(&mut self, lane: usize, elements: Option<Arc<MaxwellSlip>>) {
+        self.elements.set(lane, elements);
+    }
+
+    /// Sets the forces of the elements of a lane to 0.
+    pub fn reset_elements(&mut self, lane: usize) {
+        self.elements.states[lane] = MaxwellSlipState::default();
     }
 
     /// Returns true if an axis has a property that the paper's model leaves out.
@@ -527,9 +546,15 @@ impl<const L: usize> AxisBlock<L> {
                 let torques = [voltage, external, max_speed_drop];
                 speed_drop = if IS_EXTENDED {
                     let deflection = self.has_presliding.then_some(&mut state.deflection);
+                    let elements = &mut self.elements;
+                    let memory = |inputs: [N; 2], bristles: (N, N)| match elements.is_present {
+                        true => elements.step(simd, index, speed, inputs, bristles),
+                        false => bristles,
+                    };
                     match self.has_elastic_axis {
                         true => {
-                            let speed_drop = loops.plant.step_elastic(motor, load, deflection, torques);
+                            let speed_drop =
+                                loops.plant.step_elastic(motor, load, deflection, torques, memory);
                             match self.has_event_driven_axis {
                                 true => {
                                     self.step_event_driven(simd, index, tick, &mut state, torques, speed_drop)
@@ -537,7 +562,7 @@ impl<const L: usize> AxisBlock<L> {
                                 false => speed_drop,
                             }
                         }
-                        false => loops.plant.step_rigid(motor, deflection, torques),
+                        false => loops.plant.step_rigid(motor, deflection, torques, memory),
                     }
                 } else {
                     loops.plant.step_with_torques(motor, voltage, external, max_speed_drop)

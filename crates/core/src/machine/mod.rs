@@ -11,6 +11,7 @@ mod contour_control;
 mod controller;
 mod coupled_ticks;
 mod coupling;
+mod elements;
 mod inner_loops;
 mod loop_responses;
 mod parameters;
@@ -153,6 +154,7 @@ impl Machine {
         let (at_rest, state) = Axis::at_rest(p, position, coupling_torque);
         *axis = at_rest;
         self.bank.set_state(index, &state);
+        self.bank.reset_elements(index);
     }
 
     /// Sets the SIMD width of the following position cycles; the results are bit-identical.
@@ -180,6 +182,7 @@ impl Machine {
             self.bank.set_state(index, &state);
             self.bank.set_loops(index, &p.loops);
             self.bank.set_event_driven(index, p.event_driven.clone());
+            self.bank.set_elements(index, p.elements.clone());
             if old.compensation.is_some() {
                 self.bank.set_compensation(index, |_| 0.0);
             }

@@ -83,6 +83,7 @@ impl MachineParameters {
         let mut bank = AxisBank::new(&loops, self.cycle_ticks());
         for (index, axis) in self.axes.iter().enumerate() {
             bank.set_event_driven(index, axis.event_driven.clone());
+            bank.set_elements(index, axis.elements.clone());
         }
         bank
     }

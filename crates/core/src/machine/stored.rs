@@ -7,7 +7,7 @@ use super::{Machine, MachineParameters};
 use crate::state_codec::{Fnv, StateCodec, checksum};
 
 /// First bytes of a state; the last two are the version of the format.
-const HEAD: [u8; 8] = *b"vastat04";
+const HEAD: [u8; 8] = *b"vastat05";
 /// Bytes of head, fingerprint of the parameters, and checksum.
 const FRAME: usize = 24;
 

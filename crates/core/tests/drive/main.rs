@@ -7,6 +7,8 @@ mod current_filter;
 mod drives;
 mod friction;
 mod gantry;
+mod gms;
+mod gms_machine;
 mod parameter_ranges;
 mod partial_cycles;
 mod presliding;

@@ -305,8 +305,8 @@ fn ranges() -> Vec<(String, f64, f64)> {
             && !key.contains("tolerances")
             && !key.contains("travel")
             && !key.contains("direct")
-            // They need each other: `transmission.rs`.
-            && !["stiffness", "damping", "load_", "transmission.backlash", "structure"].iter().any(|name| key.contains(name))
+            // They need each other: `transmission.rs`, `gms_machine.rs`.
+            && !["stiffness", "damping", "attraction", "load_", "transmission.backlash", "structure"].iter().any(|name| key.contains(name))
     };
     let ranges: Vec<_> = parameters.definitions().filter_map(number).filter(is_meant).collect();
     assert!(ranges.len() > 90, "{} parameters", ranges.len());

@@ -43,7 +43,7 @@ impl MovedBristles {
     const LAW: f64 = 1.2;
 
     fn new() -> Self {
-        let config = PreslidingConfig { stiffness: Self::STIFFNESS, damping: 0.0 };
+        let config = PreslidingConfig { stiffness: Self::STIFFNESS, ..PreslidingConfig::NONE };
         let bristles = Presliding::new(&config, 0.0, 1e-4, Self::PER_FORCE);
         MovedBristles { bristles, deflection: 0.0, displacement: 0.0 }
     }
@@ -98,7 +98,7 @@ fn the_first_micrometers_have_the_stiffness_of_the_bristles() {
 }
 
 /// Axis with the parameters of Canudas de Wit et al. (1995), table 1; V is in m/min and 1 A gives 1 N.
-fn published_axis() -> AxisConfig {
+pub fn published_axis() -> AxisConfig {
     let text = |key: &str, value: f64| format!("x.friction.{key}={value}");
     let changes = [
         text("a", 1.0),
@@ -121,7 +121,7 @@ fn published_errors(case: f64, period: f64, force: impl Fn(f64, f64) -> f64) -> 
     // Displacement of a mass of 1 kg by a force of 1 N over a tick.
     let per_force = period * period / 2.0;
     let (law, viscosity) = Friction::of_axis(&published_axis(), 1.0).of_presliding();
-    let config = PreslidingConfig { stiffness: 1e5, damping: 1e5_f64.sqrt() };
+    let config = PreslidingConfig { stiffness: 1e5, damping: 1e5_f64.sqrt(), ..PreslidingConfig::NONE };
     let bristles = Presliding::new(&config, viscosity, period, per_force);
     let (mut position, mut speed, mut deflection, mut step) = (0.0, 0.0, 0.0, 0);
     let (mut worst, mut largest) = ([0.0_f64; 2], [0.0_f64; 2]);

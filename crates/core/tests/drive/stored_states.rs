@@ -49,8 +49,8 @@ const VARIANTS: [&[&str]; 4] = [
     &["feedforward.velocity=0.5", "delays.alpha_ms=20"],
 ];
 
-/// X with everything that the state of an axis can contain.
-const EXTENDED_X: [&str; 8] = [
+/// X and Y with everything that the state of an axis can contain.
+const EXTENDED: [&str; 11] = [
     "x.transmission.stiffness_n_um=200",
     "x.transmission.load_mass_kg=1200",
     "x.transmission.backlash_um=10",
@@ -59,6 +59,9 @@ const EXTENDED_X: [&str; 8] = [
     "x.structure.mass_kg=5000",
     "x.backlash_compensation.width_um=8",
     "x.current_filter_1.type=low_pass",
+    "y.friction.presliding_stiffness_n_um=50",
+    "y.friction.presliding_elements=4",
+    "y.friction.presliding_attraction_n_s=1e4",
 ];
 
 proptest! {
@@ -69,7 +72,7 @@ proptest! {
         before in prop::collection::vec(1_usize..200, 0..40),
         after in prop::collection::vec(1_usize..200, 20),
     ) {
-        let extended = (&[][..], &EXTENDED_X[..]);
+        let extended = (&[][..], &EXTENDED[..]);
         for changes in VARIANTS.into_iter().map(|of_axes| (of_axes, &[][..])).chain([extended]) {
             let parameters = parameters_with(changes.0, changes.1);
             let mut machine = Machine::new(parameters.clone());

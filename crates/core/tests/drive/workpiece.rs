@@ -216,7 +216,10 @@ fn forces_agree_with_the_motion_of_every_tick() {
     let elastic = ["a.transmission.stiffness_nm_rad=2e6", "a.transmission.load_inertia_kg_m2=12"];
     let presliding =
         ["a.friction.presliding_stiffness_nm_rad=1e6", "c.friction.presliding_stiffness_nm_rad=1e6"];
-    for changes in [&[][..], &elastic, &presliding, &[&elastic[..], &presliding].concat()] {
+    let elements =
+        [&presliding[..], &["a.friction.presliding_elements=4", "c.friction.presliding_elements=6"]].concat();
+    let combined = [&presliding[..], &elements].map(|friction| [&elastic[..], friction].concat());
+    for changes in [&[][..], &elastic, &presliding, &elements, &combined[0], &combined[1]] {
         let config = configured_with("mikron_ucp710", &[], &[&WORKPIECE[..], changes].concat());
         let dynamics = WorkpieceDynamics::new(config.kinematics(), config.workpiece().expect("a workpiece"));
         let mut machine = machine(&config);

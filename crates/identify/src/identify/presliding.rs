@@ -80,10 +80,13 @@ impl PreslidingFit {
     /// Sets the presliding of an axis; an undetermined damping keeps its value.
     pub(super) fn apply(&self, axis: &mut AxisConfig) {
         let square = axis.transmission_ratio * axis.transmission_ratio;
-        let kept = axis.presliding.map_or(0.0, |before| before.damping);
+        let before = axis.presliding.unwrap_or(PreslidingConfig::NONE);
+        // Elements have no damping.
+        let damping = self.damping.filter(|_| before.elements == 0);
         axis.presliding = Some(PreslidingConfig {
             stiffness: self.stiffness * square,
-            damping: self.damping.map_or(kept, |(value, _)| value * square),
+            damping: damping.map_or(before.damping, |(value, _)| value * square),
+            ..before
         });
     }
 }

@@ -179,7 +179,9 @@ impl Identification {
         ] {
             put(&[key], fit.stiffness / unit, Some(fit.error() / unit), None, source.clone());
         }
-        if let Some((value, error)) = fit.damping {
+        // Elements have no damping.
+        let has_elements = self.initial.presliding.is_some_and(|presliding| presliding.elements > 0);
+        if let Some((value, error)) = fit.damping.filter(|_| !has_elements) {
             let keys = ["friction.presliding_damping_n_s_m", "friction.presliding_damping_nm_s_rad"];
             put(&keys, value, Some(error), None, source);
         }

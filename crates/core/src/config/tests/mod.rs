@@ -3,6 +3,7 @@
 mod backlash;
 mod couplings;
 mod machines;
+mod presliding;
 mod rejected_files;
 mod rejected_values;
 mod setting;

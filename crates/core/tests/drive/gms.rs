@@ -1,0 +1,398 @@
+//! Friction with presliding by elements (generalized Maxwell-slip model): closed forms, the equations of its authors, and
+//! energy.
+
+use std::f64::consts::TAU;
+
+use proptest::prelude::*;
+use virtual_axes_core::config::{MachineConfig, PreslidingConfig};
+use virtual_axes_core::drive::{
+    Friction, LoadState, MaxwellSlip, MaxwellSlipElement, MaxwellSlipState, MotorState, Plant, Presliding,
+};
+use virtual_axes_verification::fixtures::machines::configured_with;
+
+use crate::parameter_ranges::golden;
+use crate::presliding::published_axis;
+
+const X: usize = 0;
+/// σ0, N/m.
+const STIFFNESS: f64 = 1e5;
+/// Sliding friction without velocity dependence, N.
+const LAW: f64 = 1.2;
+/// Displacement per force over a tick of moved elements: friction hardly changes the displacement.
+const PER_FORCE: f64 = 1e-18;
+
+fn machine(changes: &[&str]) -> MachineConfig {
+    configured_with("mikron_ucp710", &[], changes)
+}
+
+/// Elements on a support that is moved.
+struct MovedElements {
+    model: MaxwellSlip,
+    state: MaxwellSlipState,
+    displacement: f64,
+}
+
+impl MovedElements {
+    fn new(count: usize) -> Self {
+        let elements = MaxwellSlipElement::of_loading_curve(count, STIFFNESS);
+        let model = MaxwellSlip::new(&elements, None, 0.0, 1e-4, PER_FORCE);
+        MovedElements { model, state: MaxwellSlipState::default(), displacement: 0.0 }
+    }
+
+    /// Moves the support to a displacement in 100 steps and returns the force, N.
+    fn move_to(&mut self, displacement: f64) -> f64 {
+        let from = self.displacement;
+        for step in 1..=100 {
+            let next = from + (displacement - from) * f64::from(step) / 100.0;
+            let distance = next - self.displacement;
+            self.model.step(distance, PER_FORCE * LAW, distance / 1e-4, &mut self.state);
+            self.displacement = next;
+        }
+        self.state.forces.iter().sum()
+    }
+
+    /// Returns the force of the first loading at a displacement, N.
+    fn first_loading(&self, displacement: f64) -> f64 {
+        let force = |e: &MaxwellSlipElement| (e.stiffness * displacement).min(e.share * LAW);
+        self.model.elements().iter().map(force).sum()
+    }
+}
+
+#[test]
+fn the_first_loading_curve_has_points_of_that_of_the_bristles() {
+    for count in 1..=10_u32 {
+        let elements = MaxwellSlipElement::of_loading_curve(count as usize, STIFFNESS);
+        let number = f64::from(count);
+        assert!((elements.iter().map(|e| e.share).sum::<f64>() - 1.0).abs() < 1e-14);
+        let start = if count == 1 { 0.5 } else { -1.0 / (number * (1.0 - 1.0 / number).ln()) };
+        let stiffness: f64 = elements.iter().map(|e| e.stiffness).sum();
+        assert!((stiffness / STIFFNESS - start).abs() < 1e-14, "{count}: {stiffness} N/m");
+        assert!(elements.iter().all(|e| e.stiffness > 0.0 && e.share > 0.0), "{elements:?}");
+        let mut moved = MovedElements::new(count as usize);
+        for j in 1..count {
+            let level = f64::from(j) / number;
+            let force = moved.move_to(-LAW / STIFFNESS * (1.0 - level).ln());
+            assert!((force - LAW * level).abs() < 1e-9, "{count} elements, knot {j}: {force} N");
+        }
+        let last = LAW / STIFFNESS * (number.ln() + 2.0);
+        assert!(count == 1 || moved.move_to(0.999 * last) < LAW * (1.0 - 1e-5));
+        assert!((moved.move_to(last) - LAW).abs() < 1e-9 && (moved.move_to(2.0 * last) - LAW).abs() < 1e-9);
+        // Beyond the knots of both curves the work is the same: the sum of LAW − F over the displacement.
+        let lost = |e: &MaxwellSlipElement| (e.share * LAW).powi(2) / (2.0 * e.stiffness);
+        let tail = -(1..count)
+            .map(|j| {
+                let knot = |j: u32| -(1.0 - f64::from(j) / number).ln();
+                let (from, to) = (knot(j - 1), knot(j));
+                // Chord minus curve.
+                (to - from) * (1.0 - (f64::from(j) - 0.5) / number) - ((-from).exp() - (-to).exp())
+            })
+            .sum::<f64>();
+        let exact = LAW * LAW / STIFFNESS * (1.0 - tail);
+        let found: f64 = elements.iter().map(lost).sum();
+        assert!((found / exact - 1.0).abs() < 1e-12, "{count}: {found} J, not {exact} J");
+    }
+}
+
+/// Masing's rule: a curve after a reversal is the first loading curve, twice as large, until it meets the curve before the
+/// reversal before.
+#[test]
+fn curves_after_reversals_follow_masings_rule() {
+    let mut moved = MovedElements::new(6);
+    let mut worst = 0.0_f64;
+    let (mut from, mut displacement) = (moved.move_to(3e-5), 3e-5);
+    let first = (from - moved.first_loading(3e-5)).abs();
+    // Amplitudes that decrease: no curve meets an older one.
+    for reversal in 1..30 {
+        let next = 3e-5 * 0.9_f64.powi(reversal) * if reversal % 2 == 1 { -1.0 } else { 1.0 };
+        let mut force = from;
+        for part in 1..=7 {
+            let target = displacement + (next - displacement) * f64::from(part) / 7.0;
+            force = moved.move_to(target);
+            let distance = target - displacement;
+            let exact = from + 2.0 * distance.signum() * moved.first_loading(distance.abs() / 2.0);
+            worst = worst.max((force - exact).abs());
+        }
+        (from, displacement) = (force, next);
+    }
+    println!("largest difference to the first loading {first:e} N, and to Masing's rule {worst:e} N");
+    assert!(first < 1e-9 && worst < 1e-9);
+}
+
+/// A minor loop returns to the point where it began, and the curve goes on as without it.
+#[test]
+fn minor_loops_are_closed_and_forgotten() {
+    let path = |inner: &[f64]| {
+        let mut moved = MovedElements::new(6);
+        let forces = [3e-5, -2.5e-5, 0.8e-5].map(|to| moved.move_to(to));
+        let back = inner.iter().map(|&to| moved.move_to(to)).last().unwrap_or(forces[2]);
+        (forces[2], back, [1e-5, 2e-5, 2.9e-5, 4e-5].map(|to| moved.move_to(to)))
+    };
+    let (_, _, wanted) = path(&[]);
+    let mut worst = 0.0_f64;
+    for inner in [&[-1e-5, 0.8e-5][..], &[0.0, 0.5e-5, 0.2e-5, 0.5e-5, 0.8e-5], &[0.7e-5, 0.8e-5]] {
+        let (before, after, found) = path(inner);
+        worst = worst.max((after - before).abs());
+        for (found, wanted) in found.iter().zip(wanted) {
+            worst = worst.max((found - wanted).abs());
+        }
+    }
+    // The bristles of the LuGre model have one state: the loop is not closed.
+    let config = PreslidingConfig { stiffness: STIFFNESS, ..PreslidingConfig::NONE };
+    let bristles = Presliding::new(&config, 0.0, 1e-4, PER_FORCE);
+    let (mut deflection, mut at) = (0.0, 0.0);
+    let mut forces = [3e-5, -2.5e-5, 0.8e-5, -1e-5, 0.8e-5].map(|to| {
+        for _ in 0..10_000 {
+            deflection = bristles.step((to - at) / 1e4, PER_FORCE * LAW, deflection).1;
+        }
+        at = to;
+        STIFFNESS * deflection
+    });
+    forces[4] -= forces[2];
+    println!("largest gap of a minor loop {worst:e} N, with bristles {} N", forces[4]);
+    assert!(worst < 1e-9 && forces[4].abs() > 0.05);
+}
+
+/// Returns the mean positions of a mass of 1 kg over periods of a vibrating force, m; `friction` returns the displacement by
+/// friction from that without, and the speed.
+fn vibration(mut friction: impl FnMut(f64, f64) -> f64) -> Vec<f64> {
+    let (period, per_force) = (1e-4, 0.5e-8);
+    let (mut position, mut speed, mut means) = (0.0, 0.0, Vec::new());
+    for cycle in 0..200 {
+        let mut sum = 0.0;
+        for tick in 0..1000 {
+            let time = period * (f64::from(tick) + 0.5);
+            // At most 60 % of the breakaway force, after the first period.
+            let outer =
+                (if cycle == 0 { time / 0.1 } else { 1.0 }) * (0.36 + 0.36 * (TAU * 10.0 * time).sin());
+            let free = period * speed + per_force * outer;
+            let drop = friction(free, speed);
+            position += free - drop;
+            speed += period * (outer - drop / per_force);
+            sum += position;
+        }
+        means.push(sum / 1000.0);
+    }
+    means
+}
+
+#[test]
+fn an_axis_does_not_creep_under_a_vibrating_load() {
+    let per_force = 0.5e-8;
+    // Viscous friction of 60 N/(m/s) lets the oscillation of the mass on the springs decay.
+    let elements = MaxwellSlipElement::of_loading_curve(6, STIFFNESS);
+    let model = MaxwellSlip::new(&elements, None, 60.0, 1e-4, per_force);
+    let mut state = MaxwellSlipState::default();
+    let found = vibration(|free, speed| model.step(free, per_force * LAW, speed, &mut state));
+    let config = PreslidingConfig { stiffness: STIFFNESS, ..PreslidingConfig::NONE };
+    let bristles = Presliding::new(&config, 60.0, 1e-4, per_force);
+    let mut deflection = 0.0;
+    let lugre = vibration(|free, _| {
+        let (drop, next) = bristles.step(free, per_force * LAW, deflection);
+        deflection = next;
+        drop
+    });
+    let drift = |means: &[f64]| 1e9 * (means[199] - means[20]);
+    println!("drift over 180 periods: elements {:.2e} nm, bristles {:.0} nm", drift(&found), drift(&lugre));
+    assert!(drift(&found).abs() < 1e-3 && drift(&lugre) > 1000.0, "{found:?}");
+}
+
+/// Elements of `tools/golden_gms.py`.
+const ELEMENTS: [MaxwellSlipElement; 4] = [
+    MaxwellSlipElement { stiffness: 5e4, share: 0.2 },
+    MaxwellSlipElement { stiffness: 2.5e4, share: 0.25 },
+    MaxwellSlipElement { stiffness: 1.5e4, share: 0.25 },
+    MaxwellSlipElement { stiffness: 1e4, share: 0.3 },
+];
+const ATTRACTION: f64 = 40.0;
+
+/// Largest differences to the golden rows of a case, relative to the largest values: position, friction.
+#[derive(Default)]
+struct Difference {
+    worst: [f64; 2],
+    largest: [f64; 2],
+}
+
+impl Difference {
+    fn add(&mut self, found: [f64; 2], exact: [f64; 2]) {
+        for k in 0..2 {
+            self.worst[k] = self.worst[k].max((found[k] - exact[k]).abs());
+            self.largest[k] = self.largest[k].max(exact[k].abs());
+        }
+    }
+
+    fn relative(&self) -> [f64; 2] {
+        [self.worst[0] / self.largest[0], self.worst[1] / self.largest[1]]
+    }
+}
+
+/// Simulates a mass of 1 kg under `force(time, position)` until the times of the golden rows of a case.
+fn errors_with_mass(case: f64, viscosity: f64, period: f64, force: impl Fn(f64, f64) -> f64) -> [f64; 2] {
+    let per_force = period * period / 2.0;
+    let (law, _) = Friction::of_axis(&published_axis(), 1.0).of_presliding();
+    let model = MaxwellSlip::new(&ELEMENTS, Some(ATTRACTION), viscosity, period, per_force);
+    let mut state = MaxwellSlipState::default();
+    let (mut position, mut speed, mut step) = (0.0, 0.0, 0);
+    let mut difference = Difference::default();
+    for row in golden("gms.csv").iter().filter(|row| row[0] == case) {
+        let mut friction = 0.0;
+        while (f64::from(step) + 0.5) * period < row[1] {
+            let outer = force((f64::from(step) + 0.5) * period, position + period / 2.0 * speed);
+            let free = period * speed + per_force * outer;
+            let drop = model.step(free, per_force * law.bound(speed), speed, &mut state);
+            friction = drop / per_force;
+            position += free - drop;
+            speed += period * (outer - friction);
+            step += 1;
+        }
+        difference.add([position, friction], [row[2], row[4]]);
+    }
+    difference.relative()
+}
+
+fn two_frequencies(time: f64, _position: f64) -> f64 {
+    let angle = TAU * time / 4.0;
+    1.9 * (0.65 * angle.sin() + 0.35 * (3.0 * angle).sin())
+}
+
+#[test]
+fn presliding_under_two_frequencies_converges_to_the_equations_of_the_authors() {
+    let errors = [1e-4, 5e-5, 2.5e-5].map(|period| errors_with_mass(0.0, 200.0, period, two_frequencies));
+    println!(
+        "two frequencies, relative errors of position and friction at 0.1, 0.05 and 0.025 ms: {errors:?}"
+    );
+    for k in 0..2 {
+        assert!(errors[1][k] < 1e-2, "{errors:?}");
+        assert!((errors[1][k] / errors[2][k] - 2.0).abs() < 0.3, "{errors:?}");
+    }
+}
+
+/// The forces of slipping elements are limited as in case 3; without the limit (case 1) the equations of the authors can
+/// supply energy at the end of a slip.
+#[test]
+fn stick_slip_converges_to_the_equations_with_limited_growth() {
+    let spring = |time: f64, position: f64| 200.0 * (0.001 * time - position);
+    let errors = [1e-4, 5e-5, 2.5e-5].map(|period| errors_with_mass(3.0, 40.0, period, spring));
+    let unlimited = errors_with_mass(1.0, 40.0, 2.5e-5, spring);
+    println!("stick-slip, relative errors of position and friction at 0.1, 0.05 and 0.025 ms: {errors:?}");
+    println!("stick-slip, relative differences to the equations without limit at 0.025 ms: {unlimited:?}");
+    for k in 0..2 {
+        assert!(errors[1][k] < 1e-2, "{errors:?}");
+        assert!((errors[1][k] / errors[2][k] - 2.0).abs() < 0.4, "{errors:?}");
+        assert!(unlimited[k] < 0.02, "{unlimited:?}");
+    }
+}
+
+/// Returns the largest difference of the friction at a sinusoidal velocity, relative to the largest; the elements follow the
+/// law at once without an `attraction`.
+fn lag_error(period: f64, attraction: Option<f64>) -> f64 {
+    let (law, _) = Friction::of_axis(&published_axis(), 1.0).of_presliding();
+    let model = MaxwellSlip::new(&ELEMENTS, attraction, 0.4, period, PER_FORCE);
+    let mut state = MaxwellSlipState::default();
+    let position = |time: f64| 1.5e-3 * time + 1.2e-3 / TAU * (1.0 - (TAU * time).cos());
+    let velocity = |time: f64| 1.5e-3 + 1.2e-3 * (TAU * time).sin();
+    let (mut difference, mut step) = (Difference::default(), 0);
+    for row in golden("gms.csv").iter().filter(|row| row[0] == 2.0) {
+        while (f64::from(step) + 0.5) * period < row[1] {
+            let [from, to] = [step, step + 1].map(|k| f64::from(k) * period);
+            let (distance, speed) = (position(to) - position(from), velocity(from));
+            model.step(distance, PER_FORCE * law.bound(speed), speed, &mut state);
+            step += 1;
+        }
+        let friction = state.forces.iter().sum::<f64>() + 0.4 * velocity(row[1]);
+        difference.add([position(row[1]), friction], [row[2], row[4]]);
+    }
+    difference.relative()[1]
+}
+
+#[test]
+fn frictional_lag_converges_to_the_equations_of_the_authors() {
+    let errors = [4e-4, 2e-4, 1e-4, 5e-5].map(|period| lag_error(period, Some(ATTRACTION)));
+    let without = lag_error(5e-5, None);
+    println!("lag, relative errors of friction at 0.4 to 0.05 ms: {errors:?}, without attraction {without}");
+    assert!(errors[3] < 1e-3 && without > 0.02, "{errors:?}, {without}");
+    for pair in errors.windows(2) {
+        assert!((pair[0] / pair[1] - 2.0).abs() < 0.3, "{errors:?}");
+    }
+}
+
+/// Trajectories of a plant in the energy test: 1 million in all.
+const TRAJECTORIES: usize = 500;
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn elements_do_not_create_energy(
+        is_elastic in prop::bool::ANY,
+        stiffness in 1.0..5.0_f64,
+        bristles in 0.0..5.0_f64,
+        count in 1..=10_usize,
+        friction in prop::array::uniform3(0.0..20.0_f64),
+        attraction in prop::option::of(-1.0..6.0_f64),
+        amplitude in -6.0..0.0_f64,
+        starts in prop::collection::vec(prop::array::uniform6(-1.0..1.0_f64), TRAJECTORIES),
+    ) {
+        let (inertia, share) = (0.028, 0.4);
+        let (stiffness, bristles) = (10_f64.powf(stiffness), 10_f64.powf(bristles));
+        let load_inertia = share * inertia;
+        let text = |key: &str, value: f64| format!("x.{key}={value}");
+        let ratio = 0.02 / TAU;
+        let per_axis = 1.0 / (ratio * ratio);
+        let [coulomb, stribeck, viscous] = friction;
+        let mut changes = vec![
+            text("motor.emf_constant_v_s_rad", 2.64),
+            text("friction.a", coulomb),
+            text("friction.b", 0.02),
+            text("friction.c", 0.0),
+            text("friction.i0", coulomb),
+            text("friction.stribeck", stribeck),
+            text("friction.viscous", 0.01 * viscous),
+            text("friction.presliding_stiffness_n_um", bristles * per_axis * 1e-6),
+            format!("x.friction.presliding_elements={count}"),
+        ];
+        if let Some(attraction) = attraction {
+            changes.push(text("friction.presliding_attraction_n_s", 10_f64.powf(attraction) / ratio));
+        }
+        if is_elastic {
+            changes.push(text("transmission.stiffness_n_um", stiffness * per_axis * 1e-6));
+            changes.push(text("transmission.load_mass_kg", load_inertia * per_axis));
+        }
+        let config = machine(&changes.iter().map(String::as_str).collect::<Vec<_>>());
+        let axis = &config.axes()[X];
+        let plant = Plant::new(axis, 125e-6).expect("can be discretized");
+        let model = MaxwellSlip::of_axis(axis, &plant, 125e-6).expect("elements");
+        let own = if is_elastic { inertia - load_inertia } else { inertia };
+        let energy = |motor: &MotorState, load: &LoadState, state: &MaxwellSlipState| {
+            let spring = axis.transmission.map_or(0.0, |t| t.stiffness * load.wind_up.powi(2) / 2.0);
+            axis.motor.inductance * motor.current.powi(2) / 2.0
+                + own * motor.speed.powi(2) / 2.0
+                + load_inertia * load.speed.powi(2) / 2.0
+                + spring
+                + model.energy(state)
+        };
+        let limit = axis.motor.torque_constant * (coulomb + stribeck);
+        let amplitude = 10_f64.powf(amplitude);
+        for start in starts {
+            let [current, speed, wind_up, load_speed] = [0, 1, 2, 3].map(|k| amplitude * start[k]);
+            let mut motor = MotorState { current: 30.0 * current, speed: 100.0 * speed, angle: 0.0 };
+            let mut load = LoadState::default();
+            if is_elastic {
+                load = LoadState { wind_up: wind_up / stiffness.sqrt(), speed: 100.0 * load_speed };
+            }
+            let mut state = MaxwellSlipState::default();
+            for (k, element) in model.elements().iter().enumerate() {
+                // Also above the limit, and of both signs.
+                state.forces[k] = 1.5 * limit * element.share * start[4 + k % 2];
+                state.is_slipping[k] = (k + usize::from(start[5] > 0.0)) % 3 == 0;
+            }
+            let first = energy(&motor, &load, &state);
+            let mut before = first;
+            for tick in 0..100 {
+                plant.step_with_maxwell_slip(&mut motor, &mut load, (&model, &mut state), 0.0, 0.0);
+                let now = energy(&motor, &load, &state);
+                prop_assert!(now <= before + 1e-13 * first, "{now} after {before}, tick {tick}, {start:?}");
+                before = now;
+            }
+        }
+    }
+}
