@@ -246,7 +246,7 @@ fn chirp() -> String {
 fn both_encoders_identify_the_transmission_of_a_trace() {
     let folder = TestFolder::new("identify_transmission");
     let path = |name: &str| folder.0.join(name).to_string_lossy().into_owned();
-    let psec = folder.file("chirp.csv", &chirp()).to_string_lossy().into_owned();
+    let psec = folder.file("chirp.csv", chirp()).to_string_lossy().into_owned();
     let of = |trace: &str| -> Value {
         let run = ["run", &psec, "--quiet", "--trace", trace, "--trace-period", "500us"];
         printed(&[run.as_slice(), &ELASTIC].concat());

@@ -4,6 +4,7 @@
 //! quantities that depend on the kind of the axis.
 
 mod steps;
+mod transmission;
 
 use serde::Serialize;
 
@@ -18,9 +19,10 @@ use super::values::IdentifiedValue;
 use crate::recording::{Finding, Signals};
 pub use steps::{
     Change, DelaySummary, DirectionsSummary, Estimate, FrictionSummary, GravitySummary, InertiaSummary,
-    IntervalSummary, LawCoefficients, LawSummary, LevelSummary, LineSummary, PreslidingSummary,
-    RefinementSummary, RestSummary, SpeedSummary, TransmissionSummary,
+    LawCoefficients, LawSummary, LevelSummary, LineSummary, PreslidingSummary, RefinementSummary,
+    RestSummary, SpeedSummary,
 };
+pub use transmission::{IntervalSummary, TransmissionSummary};
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::units::{DEGREE, MILLIMETER, MILLISECOND};
 
