@@ -87,7 +87,8 @@ pub struct PreslidingConfig {
     pub damping: f64,
     /// Number of elements of the generalized Maxwell-slip model; 0 for the LuGre model.
     pub elements: usize,
-    /// Attraction C of slipping elements, N·m/s (N/s for a linear motor); `None` if they follow the friction law at once.
+    /// Attraction C of slipping elements, N·m/s (N/s for a linear motor); `None` if they follow the friction law at
+    /// once.
     pub attraction: Option<f64>,
 }
 

@@ -19,7 +19,8 @@ pub struct MaxwellSlipElement {
 }
 
 impl MaxwellSlipElement {
-    /// Returns `count` elements (at most [`MAX_ELEMENTS`]) with the first loading curve of the LuGre model with a stiffness σ0.
+    /// Returns `count` elements (at most [`MAX_ELEMENTS`]) with the first loading curve of the LuGre model with a
+    /// stiffness σ0.
     ///
     /// The curve over the displacement x is the polygon with the knots
     ///
@@ -29,7 +30,8 @@ impl MaxwellSlipElement {
     /// ```
     ///
     /// The first N − 1 knots are points of the curve of the LuGre model, g (1 − exp(−σ0 x/g)). Beyond them both curves
-    /// have the same area below g, hence the same work. With the slopes mⱼ of the segments and m_(N+1) = 0, element j has
+    /// have the same area below g, hence the same work. With the slopes mⱼ of the segments and m_(N+1) = 0, element
+    /// j has
     ///
     /// ```text
     /// kⱼ = mⱼ − m_(j+1)                 αⱼ = ξⱼ kⱼ/σ0
@@ -87,26 +89,28 @@ impl MaxwellSlipState {
 /// torque = Σ Fᵢ + σ2 ω
 /// ```
 ///
-/// g is the friction law without its viscous part σ2, C the attraction, N·m/s. Without C a slipping element follows αᵢ g at
-/// once. Below breakaway the torque is a function of the displacements at the reversals that are not yet wiped out (nonlocal
-/// memory): closed loops of the displacement are closed loops of the torque, and an axis does not creep.
+/// g is the friction law without its viscous part σ2, C the attraction, N·m/s. Without C a slipping element follows
+/// αᵢ g at once. Below breakaway the torque is a function of the displacements at the reversals that are not yet
+/// wiped out (nonlocal memory): closed loops of the displacement are closed loops of the torque, and an axis does not
+/// creep.
 ///
-/// A tick h solves the equations by the implicit Euler method over the displacement y of the motor, with g and the direction
-/// of slip at the speed at the start of the tick:
+/// A tick h solves the equations by the implicit Euler method over the displacement y of the motor, with g and the
+/// direction of slip at the speed at the start of the tick:
 ///
 /// ```text
 /// Fᵢ′ = P(Fᵢ + kᵢ y)                 torque = Σ Fᵢ′ + σ2 y/h             y = y_free − q · torque
 /// ```
 ///
-/// P limits to the range −Lᵢ⁻ … Lᵢ⁺. An element that sticks has Lᵢ = αᵢ g; one that slips has the force of the law of C at the
-/// end of the tick, Lᵢ = Fᵢ + (αᵢ g − Fᵢ) h C/(g + h C) in its direction. y_free is the displacement without friction, q > 0
-/// the displacement per torque. The torque is piecewise linear and does not decrease with y, and the equation of y is concave
-/// in the direction of motion: Newton's method from y = 0 ends at the exact solution after at most N + 1 steps.
+/// P limits to the range −Lᵢ⁻ … Lᵢ⁺. An element that sticks has Lᵢ = αᵢ g; one that slips has the force of the law of
+/// C at the end of the tick, Lᵢ = Fᵢ + (αᵢ g − Fᵢ) h C/(g + h C) in its direction. y_free is the displacement without
+/// friction, q > 0 the displacement per torque. The torque is piecewise linear and does not decrease with y, and the
+/// equation of y is concave in the direction of motion: Newton's method from y = 0 ends at the exact solution after
+/// at most N + 1 steps.
 ///
 /// Friction never supplies energy. Fᵢ′ is the point of a range with 0 in it that is next to Fᵢ + kᵢ y, so that
-/// Fᵢ′ (Fᵢ + kᵢ y − Fᵢ′) ≥ 0. Hence the work Fᵢ′ y ≥ Fᵢ′ (Fᵢ′ − Fᵢ)/kᵢ = (Fᵢ′² − Fᵢ²)/(2 kᵢ) + (Fᵢ′ − Fᵢ)²/(2 kᵢ), at least the
-/// change of the energy of the spring; this holds for all limits Lᵢ ≥ 0, and a force that is limited before y is known only
-/// loses energy.
+/// Fᵢ′ (Fᵢ + kᵢ y − Fᵢ′) ≥ 0. Hence the work Fᵢ′ y ≥ Fᵢ′ (Fᵢ′ − Fᵢ)/kᵢ = (Fᵢ′² − Fᵢ²)/(2 kᵢ) + (Fᵢ′ − Fᵢ)²/(2 kᵢ), at
+/// least the change of the energy of the spring; this holds for all limits Lᵢ ≥ 0, and a force that is limited before
+/// y is known only loses energy.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MaxwellSlip {
     elements: [MaxwellSlipElement; MAX_ELEMENTS],
@@ -137,9 +141,9 @@ struct Directed {
 }
 
 impl MaxwellSlip {
-    /// Creates the model of at most [`MAX_ELEMENTS`] elements with an attraction C (N·m/s; `None` if slipping elements follow
-    /// the law at once) and a viscosity σ2 (N·m·s/rad) for ticks of `period` seconds, in which a constant torque of 1 N·m
-    /// displaces the motor by `angle_per_torque`, rad. Further elements are left out.
+    /// Creates the model of at most [`MAX_ELEMENTS`] elements with an attraction C (N·m/s; `None` if slipping
+    /// elements follow the law at once) and a viscosity σ2 (N·m·s/rad) for ticks of `period` seconds, in which a
+    /// constant torque of 1 N·m displaces the motor by `angle_per_torque`, rad. Further elements are left out.
     pub fn new(
         elements: &[MaxwellSlipElement],
         attraction: Option<f64>,
@@ -160,8 +164,8 @@ impl MaxwellSlip {
         }
     }
 
-    /// Creates the model of an axis with its deviation over ticks of `period` seconds; `plant` is that of the axis over the
-    /// same period. Returns `None` for an axis without elements.
+    /// Creates the model of an axis with its deviation over ticks of `period` seconds; `plant` is that of the axis
+    /// over the same period. Returns `None` for an axis without elements.
     pub fn of_axis(axis: &AxisConfig, plant: &Plant, period: f64) -> Option<Self> {
         let presliding = axis.presliding.filter(|presliding| presliding.elements > 0)?;
         let deviation = axis.deviation.friction;
@@ -188,8 +192,8 @@ impl MaxwellSlip {
 
     /// Steps the elements by one tick; returns the displacement by friction, q · torque.
     ///
-    /// `free` is the displacement without friction, `law` is q g (not negative), both in rad at the motor; `speed` is that
-    /// of the motor at the start of the tick, rad/s.
+    /// `free` is the displacement without friction, `law` is q g (not negative), both in rad at the motor; `speed` is
+    /// that of the motor at the start of the tick, rad/s.
     #[inline]
     pub fn step(&self, free: f64, law: f64, speed: f64, state: &mut MaxwellSlipState) -> f64 {
         let law = law * self.torque_per_angle;

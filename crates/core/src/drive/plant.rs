@@ -112,7 +112,8 @@ impl Plant {
         self.step_with_memory(s, load_state, deflection, [voltage, load], |_, lugre| lugre)
     }
 
-    /// Steps the plant of an axis with the elements `friction` by one tick; see [`step_with_load`](Self::step_with_load).
+    /// Steps the plant of an axis with the elements `friction` by one tick; see
+    /// [`step_with_load`](Self::step_with_load).
     pub fn step_with_maxwell_slip(
         &self,
         s: &mut MotorState,
@@ -234,9 +235,9 @@ impl<N: SimdReal> Plant<N> {
     /// Steps a rigid plant by one tick under a voltage, a torque and a bound of friction, as
     /// [`step_with_torques`](Self::step_with_torques), with presliding if there is a `deflection`.
     ///
-    /// `memory` returns the displacement by friction and the deflection at the end of the tick, from the displacement without
-    /// friction, that by the friction law (rad), and the result of the bristles; it replaces the latter in the lanes with
-    /// another model.
+    /// `memory` returns the displacement by friction and the deflection at the end of the tick, from the displacement
+    /// without friction, that by the friction law (rad), and the result of the bristles; it replaces the latter in
+    /// the lanes with another model.
     #[inline(always)]
     pub(crate) fn step_rigid(
         &self,

@@ -56,8 +56,8 @@ impl<const L: usize> Elements<L> {
         }
     }
 
-    /// Steps the lanes with elements by one tick, each by itself; returns displacement by friction and deflection, those of
-    /// `bristles` in the other lanes. See [`MaxwellSlip::step`].
+    /// Steps the lanes with elements by one tick, each by itself; returns displacement by friction and deflection,
+    /// those of `bristles` in the other lanes. See [`MaxwellSlip::step`].
     #[inline(always)]
     pub fn step<S: Simd, N: SimdLoad<S>>(
         &mut self,

@@ -1,5 +1,5 @@
-//! Friction with presliding by elements (generalized Maxwell-slip model): closed forms, the equations of its authors, and
-//! energy.
+//! Friction with presliding by elements (generalized Maxwell-slip model): closed forms, the equations of its authors,
+//! and energy.
 
 use std::f64::consts::TAU;
 
@@ -93,8 +93,8 @@ fn the_first_loading_curve_has_points_of_that_of_the_bristles() {
     }
 }
 
-/// Masing's rule: a curve after a reversal is the first loading curve, twice as large, until it meets the curve before the
-/// reversal before.
+/// Masing's rule: a curve after a reversal is the first loading curve, twice as large, until it meets the curve
+/// before the reversal before.
 #[test]
 fn curves_after_reversals_follow_masings_rule() {
     let mut moved = MovedElements::new(6);
@@ -152,8 +152,8 @@ fn minor_loops_are_closed_and_forgotten() {
     assert!(worst < 1e-9 && forces[4].abs() > 0.05);
 }
 
-/// Returns the mean positions of a mass of 1 kg over periods of a vibrating force, m; `friction` returns the displacement by
-/// friction from that without, and the speed.
+/// Returns the mean positions of a mass of 1 kg over periods of a vibrating force, m; `friction` returns the
+/// displacement by friction from that without, and the speed.
 fn vibration(mut friction: impl FnMut(f64, f64) -> f64) -> Vec<f64> {
     let (period, per_force) = (1e-4, 0.5e-8);
     let (mut position, mut speed, mut means) = (0.0, 0.0, Vec::new());
@@ -266,8 +266,8 @@ fn presliding_under_two_frequencies_converges_to_the_equations_of_the_authors() 
     }
 }
 
-/// The forces of slipping elements are limited as in case 3; without the limit (case 1) the equations of the authors can
-/// supply energy at the end of a slip.
+/// The forces of slipping elements are limited as in case 3; without the limit (case 1) the equations of the authors
+/// can supply energy at the end of a slip.
 #[test]
 fn stick_slip_converges_to_the_equations_with_limited_growth() {
     let spring = |time: f64, position: f64| 200.0 * (0.001 * time - position);
@@ -282,8 +282,8 @@ fn stick_slip_converges_to_the_equations_with_limited_growth() {
     }
 }
 
-/// Returns the largest difference of the friction at a sinusoidal velocity, relative to the largest; the elements follow the
-/// law at once without an `attraction`.
+/// Returns the largest difference of the friction at a sinusoidal velocity, relative to the largest; the elements
+/// follow the law at once without an `attraction`.
 fn lag_error(period: f64, attraction: Option<f64>) -> f64 {
     let (law, _) = Friction::of_axis(&published_axis(), 1.0).of_presliding();
     let model = MaxwellSlip::new(&ELEMENTS, attraction, 0.4, period, PER_FORCE);

@@ -26,7 +26,8 @@ fn rejection(changes: &[&str]) -> String {
 fn elements_need_a_stiffness_and_have_no_damping() {
     assert_eq!(
         rejection(&[ELEMENTS]),
-        "test: x.friction.presliding_stiffness_n_um is missing: expected it above 0 beside x.friction.presliding_elements"
+        "test: x.friction.presliding_stiffness_n_um is missing: expected it above 0 beside \
+         x.friction.presliding_elements"
     );
     assert_eq!(
         rejection(&[STIFFNESS, "x.friction.presliding_damping_n_s_m=5", ELEMENTS]),
@@ -43,7 +44,8 @@ fn elements_need_a_stiffness_and_have_no_damping() {
 fn an_attraction_needs_elements() {
     assert_eq!(
         rejection(&[STIFFNESS, "x.friction.presliding_attraction_n_s=1e4"]),
-        "test: x.friction.presliding_elements is missing: expected it above 0 beside x.friction.presliding_attraction_n_s"
+        "test: x.friction.presliding_elements is missing: expected it above 0 beside \
+         x.friction.presliding_attraction_n_s"
     );
 }
 
