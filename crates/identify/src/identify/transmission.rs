@@ -95,17 +95,19 @@ pub struct MassesFit {
 }
 
 impl TransmissionFit {
-    /// Sets the transmission of an axis, if the masses were identified.
+    /// Sets the transmission of an axis, if the masses were identified; what is not determined is unchanged.
     pub(super) fn apply(&self, axis: &mut AxisConfig) {
         let Some(masses) = &self.masses else { return };
-        let square = axis.transmission_ratio * axis.transmission_ratio;
-        let before = axis.transmission;
+        let (ratio, before) = (axis.transmission_ratio, axis.transmission);
+        let square = ratio * ratio;
+        let kept = |of: fn(&TransmissionConfig) -> f64| before.as_ref().map_or(0.0, of);
+        let backlash = self.backlash.map(|gap| gap.value / ratio).or(self.excluded_backlash.map(|_| 0.0));
         axis.transmission = Some(TransmissionConfig {
             stiffness: masses.stiffness.value * square,
-            damping: masses.damping.map_or(0.0, |damping| damping.value * square),
+            damping: masses.damping.map_or(kept(|t| t.damping), |damping| damping.value * square),
             load_inertia: masses.load.value * square,
-            backlash: self.backlash.map_or(0.0, |gap| gap.value / axis.transmission_ratio),
-            load_friction: before.map_or(0.0, |before| before.load_friction),
+            backlash: backlash.unwrap_or(kept(|t| t.backlash)),
+            load_friction: kept(|t| t.load_friction),
             structure: before.and_then(|before| before.structure),
         });
     }

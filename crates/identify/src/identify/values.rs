@@ -1,5 +1,7 @@
 //! Identified values as parameters of a machine file.
 
+mod transmission;
+
 use serde::Serialize;
 
 use super::delays::DelayParameter;
@@ -8,9 +10,7 @@ use super::gravity::{GravityCurrent, GravitySource};
 use super::identification::Identification;
 use super::refine::{RefinedParameter, RefinedValue};
 use virtual_axes_core::config::{Assignment, ConfigError, Parameters, Value, ValueSource};
-use virtual_axes_core::units::{
-    DEGREE, MICROMETER, MILLISECOND, MILLISECOND_NS, NEWTON_PER_MICROMETER, POSITION_GAIN,
-};
+use virtual_axes_core::units::{DEGREE, MILLISECOND, MILLISECOND_NS, NEWTON_PER_MICROMETER, POSITION_GAIN};
 
 /// Digits of a value beyond the first digit of its standard error.
 const GUARD_DIGITS: i32 = 2;
@@ -184,46 +184,6 @@ impl Identification {
         if let Some((value, error)) = fit.damping.filter(|_| !has_elements) {
             let keys = ["friction.presliding_damping_n_s_m", "friction.presliding_damping_nm_s_rad"];
             put(&keys, value, Some(error), None, source);
-        }
-    }
-
-    fn push_transmission(&self, put: &mut ValueSink<'_>) {
-        let Some(fit) = &self.transmission else { return };
-        let Some(masses) = &fit.masses else { return };
-        let source = || "motion of motor and load".to_owned();
-        let mut both = |linear: (&str, f64), rotary: (&str, f64), value: f64, error: f64| {
-            for (key, unit) in [linear, rotary] {
-                put(&[key], value / unit, Some(error / unit), None, source());
-            }
-        };
-        both(
-            ("transmission.stiffness_n_um", NEWTON_PER_MICROMETER),
-            ("transmission.stiffness_nm_rad", 1.0),
-            masses.stiffness.value,
-            masses.stiffness.error(),
-        );
-        let damping = masses.damping.map_or((0.0, 0.0), |damping| (damping.value, damping.error()));
-        both(
-            ("transmission.damping_n_s_m", 1.0),
-            ("transmission.damping_nm_s_rad", 1.0),
-            damping.0,
-            damping.1,
-        );
-        both(
-            ("transmission.load_mass_kg", 1.0),
-            ("transmission.load_inertia_kg_m2", 1.0),
-            masses.load.value,
-            masses.load.error(),
-        );
-        // A gap that is not seen is closed, one that cannot be seen is unchanged.
-        let gap = fit.backlash.map(|gap| (gap.value, gap.error()));
-        if let Some((width, error)) = gap.or(fit.excluded_backlash.map(|bound| (0.0, bound / INTERVAL))) {
-            both(
-                ("transmission.backlash_um", MICROMETER),
-                ("transmission.backlash_deg", DEGREE),
-                width,
-                error,
-            );
         }
     }
 
