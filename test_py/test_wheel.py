@@ -219,7 +219,7 @@ def test_a_frequency_response_equals_the_csv_of_the_command(machine: va.Machine)
     inside = found.frequency_hz < 0.49 / model.period
     expected = transfer(np.exp(2j * np.pi * found.frequency_hz[inside] * model.period))
     np.testing.assert_allclose(found.open_db[inside], 20 * np.log10(np.abs(expected)), atol=1e-6)
-    with pytest.raises(ValueError, match="torque.*must be current, velocity or position"):
+    with pytest.raises(ValueError, match="torque.*must be current, velocity, position or contour"):
         va.design.frequency_response(machine, "x", "torque")
     with pytest.raises(ValueError, match="axis .w. is unknown"):
         va.design.frequency_response(machine, "w")

@@ -112,11 +112,16 @@ pub fn run(arguments: &BodeArguments) -> Result<String, Box<dyn Error>> {
         .into_iter()
         .filter_map(|index| config.axes().get(index).map(AxisConfig::name))
         .collect();
-    if arguments.loops == [LoopName::Contour] && coupled.is_empty() {
-        return Err("--loop contour: cross-coupled control is off; set contour_control.gain above 0".into());
+    let selected = selected_axes(config.axes(), &arguments.axis)?;
+    let has_contour = selected.iter().any(|axis| coupled.contains(&axis.name()));
+    if arguments.loops == [LoopName::Contour] && !has_contour {
+        return Err(match coupled.is_empty() {
+            true => "--loop contour: cross-coupled control is off; set contour_control.gain above 0".into(),
+            false => format!("--loop contour: only {} have this loop", coupled.join(", ")).into(),
+        });
     }
     let mut axes = Vec::new();
-    for axis in selected_axes(config.axes(), &arguments.axis)? {
+    for axis in selected {
         let gain = coupled.contains(&axis.name()).then_some(gain);
         let loops = analyze((axis, gain), &config.periods(), &arguments.loops)
             .map_err(|error| format!("axis {}: {error}", axis.name()))?;

@@ -61,17 +61,24 @@ pub struct IdentifyArguments {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "off|velocity|both[,…]")]
     feedforward: Vec<FeedforwardName>,
     /// Refine i0 independently of a + c; requires several slow starts from rest.
-    #[arg(long, conflicts_with = "no_refine")]
+    #[arg(long, conflicts_with = "no_refine", requires = "recordings")]
     free_i0: bool,
     /// Parameter groups that the refinement in closed loop adjusts [default: all].
-    #[arg(long, value_enum, value_delimiter = ',', conflicts_with = "no_refine", value_name = "GROUP,…")]
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        conflicts_with = "no_refine",
+        requires = "recordings",
+        value_name = "GROUP,…"
+    )]
     refine: Vec<RefinedGroup>,
     /// Skip the refinement in closed loop; run only the steps of the paper.
     #[arg(long)]
     no_refine: bool,
     /// Identify stiffness and damping of the presliding from slow reversals; the lag of the current is that of
     /// --current-lag-ms, 0 by default.
-    #[arg(long)]
+    #[arg(long, requires = "recordings")]
     presliding: bool,
     /// Recording with the encoders of motor and load (channels position and motor_position), to identify stiffness,
     /// damping, inertia of the load and backlash of the transmission; can be repeated.

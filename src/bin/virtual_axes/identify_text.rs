@@ -288,6 +288,7 @@ fn transmission(found: &TransmissionSummary, length: &str) -> String {
     let mut text = format!("transmission: antiresonance {} Hz", interval(&found.antiresonance_hz));
     let named = [
         ("stiffness", &found.stiffness, found.stiffness_unit),
+        ("damping", &found.damping, found.damping_unit()),
         ("load", &found.load_inertia, found.inertia_unit),
         ("motor and load", &found.total_inertia, found.inertia_unit),
         ("backlash", &found.backlash, length),

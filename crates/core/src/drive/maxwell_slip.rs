@@ -169,8 +169,10 @@ impl MaxwellSlip {
     pub fn of_axis(axis: &AxisConfig, plant: &Plant, period: f64) -> Option<Self> {
         let presliding = axis.presliding.filter(|presliding| presliding.elements > 0)?;
         let deviation = axis.deviation.friction;
-        let elements =
-            MaxwellSlipElement::of_loading_curve(presliding.elements, presliding.stiffness * deviation);
+        // After a reversal the curve has twice the length of the first loading curve, with the same slope (Masing's rule), that
+        // of the LuGre model the slope 2 σ0: with twice the stiffness both have the same curve after a reversal.
+        let stiffness = 2.0 * presliding.stiffness * deviation;
+        let elements = MaxwellSlipElement::of_loading_curve(presliding.elements, stiffness);
         let (_, viscosity) = Friction::of_axis(axis, axis.motor.torque_constant * deviation).of_presliding();
         let attraction = presliding.attraction.map(|attraction| attraction * deviation);
         Some(MaxwellSlip::new(&elements, attraction, viscosity, period, plant.angle_per_torque()))

@@ -225,7 +225,8 @@ impl AxisIdentification {
         }
         findings.sort_by_key(|finding| Reverse(finding.severity));
         let values = identification.values(parameters, axis.name());
-        if !values.iter().any(|value| is_determined(value, parameters, &periods)) {
+        let is_any = values.iter().any(|value| is_determined(value, parameters, &periods));
+        if !is_any && identification.transmission.is_none() {
             let lines = findings.iter().map(|finding| format!("\n{}", finding.line()));
             let axis = axis.name().to_owned();
             return Err(AxisIdentificationError::NoResult { axis, findings: lines.collect() });
@@ -249,7 +250,7 @@ impl AxisIdentification {
         });
         let validations: Vec<AxisValidation> = validations.collect::<Result<_, AxisIdentificationError>>()?;
         for AxisValidation { recorded, agreement } in &validations {
-            findings.extend(invalid_agreement(&recorded.signals.name, agreement, axis.kind()));
+            findings.extend(invalid_agreement(&recorded.signals.name, agreement, &updated.axes()[index]));
         }
         findings.sort_by_key(|finding| Reverse(finding.severity));
         let validated: Vec<(IdentificationInput<'_>, &Agreement)> =

@@ -142,6 +142,9 @@ fn report_backlash(inputs: &[IdentificationInput<'_>], found: &mut Identificatio
         AxisKind::Linear => (BACKLASH, 1e-6, "µm"),
         AxisKind::Rotary => (BACKLASH_ANGLE, 1e-3 * DEGREE, "mdeg"),
     };
+    if found.axis.transmission.is_some_and(|transmission| transmission.backlash > 0.0) {
+        return;
+    }
     for (input, agreement) in inputs.iter().zip(&found.agreements) {
         let Some(lost) = lost_motion(agreement).filter(|lost| *lost > limit) else { continue };
         found.findings.push(Finding::warning(

@@ -60,22 +60,15 @@ pub(super) fn report_invalid(inputs: &[IdentificationInput<'_>], found: &mut Ide
         }
     }
     for (input, agreement) in inputs.iter().zip(&found.agreements) {
-        let mut findings = invalid_agreement(&input.signals.name, agreement, after.kind());
-        if found.presliding.is_some() {
-            // The inverse dynamics have no presliding, which is a large part of the current of slow reversals.
-            for finding in findings.iter_mut().filter(|finding| finding.code == POOR_CURRENT) {
-                finding.severity = Severity::Warning;
-            }
-        }
-        invalid.extend(findings);
+        invalid.extend(invalid_agreement(&input.signals.name, agreement, after));
         invalid.extend(too_fast(input.signals, after));
     }
     found.findings.extend(invalid);
 }
 
 /// Returns findings on an agreement that is no result: a position worse than a constant lag, or an unexplained current.
-pub fn invalid_agreement(name: &str, agreement: &Agreement, kind: AxisKind) -> Vec<Finding> {
-    let (good, unit, symbol) = match kind {
+pub fn invalid_agreement(name: &str, agreement: &Agreement, axis: &AxisConfig) -> Vec<Finding> {
+    let (good, unit, symbol) = match axis.kind() {
         AxisKind::Linear => (GOOD, 1e-6, "µm"),
         AxisKind::Rotary => (GOOD_ANGLE, 1e-3 * DEGREE, "mdeg"),
     };
@@ -95,11 +88,16 @@ pub fn invalid_agreement(name: &str, agreement: &Agreement, kind: AxisKind) -> V
     let inverse = agreement.inverse.as_ref().map(|inverse| inverse.r_squared);
     let best = inverse.into_iter().chain(agreement.current_r_squared()).reduce(f64::max);
     if let Some(r2) = best.filter(|r2| *r2 < LEAST_DETERMINATION) {
-        invalid.push(Finding::invalid(
+        let mut finding = Finding::invalid(
             POOR_CURRENT,
             format!("{name}: the model explains {} of the current", explained(r2)),
             "check units, torque constant and transmission; record without cutting forces",
-        ));
+        );
+        if axis.presliding.is_some() || axis.transmission.is_some() {
+            // The inverse dynamics are those of a rigid axis without presliding.
+            finding.severity = Severity::Warning;
+        }
+        invalid.push(finding);
     }
     invalid
 }

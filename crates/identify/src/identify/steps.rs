@@ -41,11 +41,12 @@ pub fn identify_with_transmission(
     options: &IdentificationOptions,
 ) -> Identification {
     let mut steps = IdentificationSteps::new(inputs, axis, periods, options);
-    if !inputs.is_empty() {
-        steps.fit_axis();
-    }
+    // The closed loop is that of the elastic axis.
     if !transmission.is_empty() {
         steps.fit_transmission(transmission);
+    }
+    if !inputs.is_empty() {
+        steps.fit_axis();
     }
     steps.finish()
 }
@@ -198,7 +199,7 @@ impl<'a> IdentificationSteps<'a> {
         }
     }
 
-    /// Fits the transmission; the inertia of the axis is that of motor and load if the other recordings do not tell it.
+    /// Fits the transmission; the inertia of the axis is that of motor and load unless the other recordings tell it.
     fn fit_transmission(&mut self, recordings: &[&Signals]) {
         let found = &mut self.found;
         found.transmission = fit_transmission(recordings, (&found.axis, self.periods), &mut found.findings);

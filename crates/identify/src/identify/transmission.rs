@@ -19,22 +19,27 @@ mod motion;
 use std::f64::consts::TAU;
 
 use self::block_regression::{BlockRegression, scatter};
-use self::contact::{BLOCKS, ContactFit, Gap, fit_contact};
+use self::contact::{BLOCKS, ContactFit, Gap, UnknownGap, fit_contact};
 use self::motion::TwoEncoderMotion;
 use super::presliding::student;
 use crate::recording::{Finding, Signals};
 use virtual_axes_core::config::{AxisConfig, AxisKind, Periods, TransmissionConfig};
 use virtual_axes_core::units::{MICROMETER, Rounded, seconds};
 
-/// Smallest spread of the twist in standard deviations by the encoders.
+/// Smallest spread of the twist, and of its part by the acceleration, in standard deviations by the encoders.
 const NOISE: f64 = 5.0;
+/// Smallest coefficient of determination R² of the acceleration of the load.
+const EXPLAINED: f64 = 0.9;
+/// Standard error of the inertia of the load by forces that the equation does not contain, relative to the inertia of motor
+/// and load, where the twist accelerates as the load does.
+const UNMODELED: f64 = 0.002;
 /// Largest half of a 95 % interval, relative to the value.
 const UNCERTAIN: f64 = 0.5;
 /// Standard errors relative to the value that all blocks share: by the filter, and, with the current, by a sampling period as
 /// long as the position cycle, within which the current varies; the latter grows with its square.
 const SYSTEMATIC: [f64; 2] = [0.005, 0.0];
 const WITH_CURRENT: [f64; 2] = [0.007, 0.36];
-const OF_DAMPING: [f64; 2] = [0.02, 0.36];
+const OF_DAMPING: [f64; 2] = [0.06, 0.36];
 /// Standard errors of a 95 % interval.
 const INTERVAL: f64 = 1.96;
 /// Standard error of the width of the gap that all blocks share, relative to the twist by the encoders, to the spread of
@@ -75,7 +80,7 @@ pub struct TransmissionFit {
     pub masses: Option<MassesFit>,
     /// Width of the gap, m or rad; none if it is not above 0.
     pub backlash: Option<ConfidenceInterval>,
-    /// Width of the gap that is excluded, m or rad; none with an identified gap, or if one flank is never touched.
+    /// Width of the gap that is excluded, m or rad; none with an identified gap, or if the width is unknown.
     pub excluded_backlash: Option<f64>,
     /// Coefficient of determination R² of the acceleration of the load.
     pub r_squared: f64,
@@ -135,14 +140,23 @@ pub(super) fn fit_transmission(
             "record both encoders (channels position and motor_position)",
         ));
     }
-    let motions: Vec<TwoEncoderMotion> = recordings
-        .iter()
+    let is_new = |k: &usize| recordings[..*k].iter().all(|other| other.spans != recordings[*k].spans);
+    let motions: Vec<TwoEncoderMotion> = (0..recordings.len())
+        .filter(is_new)
+        .map(|k| recordings[k])
         .flat_map(|signals| {
             signals.spans.iter().filter_map(|span| TwoEncoderMotion::new(span, signals, axis))
         })
         .collect();
     if motions.is_empty() {
         return None;
+    }
+    for (k, signals) in recordings.iter().enumerate() {
+        if let Some(first) = recordings[..k].iter().find(|other| other.spans == signals.spans) {
+            let what =
+                format!("{} has the same samples as {}: it adds no information", signals.name, first.name);
+            findings.push(Finding::warning("same-samples", what, "give each recording once"));
+        }
     }
     let period = recordings.iter().map(|signals| signals.period).fold(0.0, f64::max);
     let fit = TransmissionSearch { motions: &motions, axis, sampling: period / seconds(periods.position) };
@@ -179,15 +193,37 @@ impl TransmissionSearch<'_> {
         let contact = if is_open { &free } else { &closed };
         let antiresonance =
             self.interval(&contact.stiffness, SYSTEMATIC, |stiffness| stiffness.max(0.0).sqrt() / TAU);
-        if contact.spread < NOISE * contact.noise || !antiresonance.is_certain() {
-            return Err(self.too_stiff(contact, antiresonance));
+        if contact.stiffness.0 <= 0.0 {
+            return Err(self.not_in_time());
         }
-        if free.widths.is_none() {
-            findings.push(Finding::warning(
+        // Without accelerations friction twists the transmission as a gap does.
+        let by_acceleration = self.acceleration() / contact.stiffness.0;
+        let is_seen = contact.spread.min(by_acceleration) >= NOISE * contact.noise;
+        if !is_seen || !antiresonance.is_certain() {
+            return Err(self.too_stiff(contact, antiresonance, is_seen));
+        }
+        if contact.r_squared < EXPLAINED {
+            return Err(Finding::missing(
+                "poor-transmission",
+                format!(
+                    "no transmission: spring, damper, gap and friction explain {:.1} % of the acceleration of the load only",
+                    100.0 * contact.r_squared
+                ),
+                "check units and signs of both positions; a structure that vibrates is not modeled",
+            ));
+        }
+        match free.widths {
+            Ok(_) => {}
+            Err(UnknownGap::OneFlank) => findings.push(Finding::warning(
                 "one-flank",
                 "backlash is not identified: the load rests on one side of the transmission in all recordings",
                 "record reversals with accelerations or friction that move the load to the other side",
-            ));
+            )),
+            Err(UnknownGap::LikeFriction) => findings.push(Finding::warning(
+                "gap-or-friction",
+                "backlash is not identified: these recordings do not tell it from the twist by friction at the load",
+                "record accelerations about a steady motion, too",
+            )),
         }
         let excluded_backlash = gap.filter(|_| !is_open).map(|gap| gap.bounds[1].max(0.0));
         let masses = self.masses(contact);
@@ -199,8 +235,12 @@ impl TransmissionSearch<'_> {
                      not tell the inertia of the load from that of the motor",
                     antiresonance.value
                 ),
-                "record the current with a chirp of the setpoint that reaches the antiresonance",
+                "record the current, at a period of 1 ms or less, with a chirp that reaches the antiresonance",
             ));
+        }
+        if masses.as_ref().is_some_and(|masses| masses.damping.is_none()) {
+            let what = "the recordings do not determine the damping of the transmission: it is unchanged";
+            findings.push(Finding::note("transmission-damping", what));
         }
         Ok(TransmissionFit {
             antiresonance,
@@ -211,16 +251,16 @@ impl TransmissionSearch<'_> {
         })
     }
 
-    /// Returns the width of the gap; none if one flank is never touched.
+    /// Returns the width of the gap; none if it is unknown.
     fn gap(&self, fit: &ContactFit) -> Option<ConfidenceInterval> {
         let sizes = [fit.noise, fit.spread, fit.gap[1]];
         let shared = sizes.iter().zip(GAP).map(|(x, part)| x * part).fold(0.0, f64::hypot);
-        let half = (student(BLOCKS - 1) * scatter(fit.widths.as_ref()?)).hypot(INTERVAL * shared);
+        let half = (student(BLOCKS - 1) * scatter(fit.widths.as_ref().ok()?)).hypot(INTERVAL * shared);
         Some(ConfidenceInterval::about(fit.gap[1], half))
     }
 
     /// Returns the finding about a twist that the encoders do not resolve.
-    fn too_stiff(&self, fit: &ContactFit, antiresonance: ConfidenceInterval) -> Finding {
+    fn too_stiff(&self, fit: &ContactFit, antiresonance: ConfidenceInterval, is_seen: bool) -> Finding {
         let (unit, name) = match self.axis.kind() {
             AxisKind::Linear => (MICROMETER, "µm"),
             AxisKind::Rotary => (1.0, "rad"),
@@ -230,7 +270,7 @@ impl TransmissionSearch<'_> {
              resolve {} {name}; an antiresonance below {:.1} Hz is excluded",
             Rounded(fit.spread / unit),
             Rounded(fit.noise / unit),
-            if fit.spread < NOISE * fit.noise {
+            if !is_seen {
                 // The acceleration would twist the transmission by more than the encoders resolve.
                 self.acceleration().max(0.0).sqrt() / (NOISE * fit.noise).sqrt() / TAU
             } else {
@@ -238,6 +278,15 @@ impl TransmissionSearch<'_> {
             }
         );
         Finding::missing("no-wind-up", what, "record larger accelerations, or encoders of a finer resolution")
+    }
+
+    /// Returns the finding about positions whose difference does not follow the acceleration.
+    fn not_in_time(&self) -> Finding {
+        Finding::missing(
+            "no-wind-up",
+            "no transmission: the difference of the positions of motor and load does not follow the acceleration of the load",
+            "check units and signs of both positions, and that motor_position is that of the motor at the axis",
+        )
     }
 
     /// Returns the standard deviation of the acceleration, m/s² or rad/s².
@@ -272,7 +321,7 @@ impl TransmissionSearch<'_> {
         // Accelerations of load and twist, friction, velocity, constant, sine and cosine of the position.
         let mut regression = BlockRegression::new(7, BLOCKS);
         let has_tilt = self.axis.kind() == AxisKind::Rotary;
-        let mut k = 0;
+        let (mut k, mut squares) = (0, [0.0; 2]);
         for motion in self.motions {
             for i in motion.samples() {
                 k += 1;
@@ -290,6 +339,8 @@ impl TransmissionSearch<'_> {
                     tilt.1,
                 ];
                 regression.add((k - 1) * BLOCKS / total, &row, force);
+                squares[0] += row[0] * row[0];
+                squares[1] += row[1] * row[1];
             }
         }
         let (all, without) = regression.jackknife(7, |c| [c[0], c[1]])?;
@@ -300,8 +351,11 @@ impl TransmissionSearch<'_> {
             (of_load.0 * load.0, parts.collect::<Vec<f64>>())
         };
         let (stiffness, damping) = (product(&contact.stiffness), product(&contact.damping));
-        let [stiffness, load, total] =
-            [stiffness, load, sum].map(|value| self.interval(&value, WITH_CURRENT, |x| x));
+        // Forces that the equation does not contain act as an inertia of the load if motor and load move as one.
+        let by_forces = UNMODELED * all[0] / load.0 * f64::sqrt(squares[0] / squares[1]);
+        let of_load = [WITH_CURRENT[0].hypot(by_forces), WITH_CURRENT[1]];
+        let [stiffness, load] = [stiffness, load].map(|value| self.interval(&value, of_load, |x| x));
+        let total = self.interval(&sum, WITH_CURRENT, |x| x);
         let damping = self.interval(&damping, OF_DAMPING, |x| x);
         let is_certain = [load, total, stiffness].iter().all(ConfidenceInterval::is_certain);
         let is_possible = load.value > 0.0 && load.value < total.value;

@@ -120,6 +120,40 @@ fn a_closed_gap_gets_a_bound() {
 }
 
 #[test]
+fn slow_reversals_alone_do_not_tell_a_gap_from_friction() {
+    let machine = elastic([150.0, 15000.0, 1300.0, 0.0]);
+    let psec: Vec<f64> = motion(seconds(machine.periods().position), 60.0).into_iter().take(1080).collect();
+    let disturbance =
+        Disturbance { sample_ticks: Some(4), motor_resolution: Some(0.0), ..Disturbance::default() };
+    let raw = RawRecording { psec: None, ..record(&machine, "x", &psec, &disturbance) };
+    let (found, start) = identified(&raw);
+    let fit = found.transmission.as_ref().unwrap_or_else(|| panic!("{:?}", found.findings));
+    assert_eq!((fit.backlash, fit.excluded_backlash), (None, None));
+    assert!(codes(&found).contains(&"gap-or-friction"), "{:?}", found.findings);
+    assert!(found.values(&start, "x").iter().all(|value| !value.key.contains("backlash")));
+}
+
+#[test]
+fn a_motion_far_below_the_antiresonance_does_not_tell_the_masses() {
+    let (found, _) = identified(&recording(&elastic(TRUTH), 6.0));
+    let masses = found.transmission.as_ref().and_then(|fit| fit.masses.as_ref());
+    // An interval may be given, if it contains the truth.
+    assert!(masses.is_none_or(|m| m.load.bounds[0] < 1300.0 && 1300.0 < m.load.bounds[1]), "{masses:?}");
+    assert!(masses.is_some() || codes(&found).contains(&"no-load-inertia"), "{:?}", found.findings);
+}
+
+#[test]
+fn swapped_encoders_and_equal_recordings_are_named() {
+    let raw = recording(&elastic(TRUTH), 60.0);
+    let swapped =
+        RawRecording { position: raw.motor_position.clone(), motor_position: raw.position.clone(), ..raw };
+    let (found, _) = identified(&swapped);
+    assert_eq!(found.transmission, None);
+    let mut texts = found.findings.iter().map(ToString::to_string);
+    assert!(texts.any(|text| text.contains("motor_position is that of the motor")), "{:?}", found.findings);
+}
+
+#[test]
 fn one_encoder_does_not_tell_the_transmission() {
     let raw = RawRecording { motor_position: None, ..recording(&elastic(TRUTH), 60.0) };
     let (found, start) = identified(&raw);

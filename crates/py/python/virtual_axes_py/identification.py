@@ -133,8 +133,8 @@ def identify(
         "presliding": presliding,
     }
     native = to_native(machine if machine is not None else Machine.load())
-    given = [_sources(recordings), _sources(transmission), _sources(validate)]
-    return Identification(_native.identify(native, axis, *given, options))
+    files, both, others = _sources(recordings), _sources(transmission), _sources(validate)
+    return Identification(_native.identify(native, axis, files, both, others, options))
 
 
 def _sources(given: Recording | Sequence[Recording]) -> list[str | dict[str, Any]]:

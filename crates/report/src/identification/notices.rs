@@ -28,7 +28,14 @@ impl Step {
                 &[Step::Friction]
             }
             "presliding-damping" => &[Step::Presliding],
-            "one-encoder" | "no-wind-up" | "one-flank" | "no-load-inertia" => &[Step::Transmission],
+            "one-encoder"
+            | "no-wind-up"
+            | "poor-transmission"
+            | "one-flank"
+            | "gap-or-friction"
+            | "no-load-inertia"
+            | "same-samples"
+            | "transmission-damping" => &[Step::Transmission],
             "saturated-current" | "no-acceleration" | "negative-inertia" | "unseen-current" => {
                 &[Step::Inertia]
             }

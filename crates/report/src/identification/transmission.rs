@@ -24,7 +24,7 @@ pub(super) fn section(page: &IdentificationPage) -> Option<Section> {
     let rows: [(&str, Option<&IntervalSummary>, &str); 6] = [
         ("antiresonance", Some(&found.antiresonance_hz), "Hz"),
         ("stiffness", found.stiffness.as_ref(), found.stiffness_unit),
-        ("damping", found.damping.as_ref(), damping_unit(found.inertia_unit)),
+        ("damping", found.damping.as_ref(), found.damping_unit()),
         ("inertia of the load", found.load_inertia.as_ref(), found.inertia_unit),
         ("inertia of motor and load", found.total_inertia.as_ref(), found.inertia_unit),
         ("backlash", found.backlash.as_ref(), length),
@@ -41,9 +41,4 @@ pub(super) fn section(page: &IdentificationPage) -> Option<Section> {
         section.paragraphs.push(format!("A backlash above {} {length} is excluded.", digits(bound, 2)));
     }
     Some(section)
-}
-
-/// Returns the unit of a damping beside that of an inertia.
-fn damping_unit(inertia: &str) -> &'static str {
-    if inertia == "kg" { "N.s/m" } else { "N.m.s/rad" }
 }

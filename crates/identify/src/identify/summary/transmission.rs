@@ -25,7 +25,7 @@ pub struct TransmissionSummary {
     pub damping: Option<IntervalSummary>,
     /// Backlash, µm or mdeg; none if it is not seen.
     pub backlash: Option<IntervalSummary>,
-    /// Backlash that is excluded, µm or mdeg; none if there is one, or if the load touched one flank only.
+    /// Backlash that is excluded, µm or mdeg; none if there is one, or if it is unknown.
     pub excluded_backlash: Option<f64>,
     /// Coefficient of determination R² of the acceleration of the load.
     pub r_squared: f64,
@@ -41,6 +41,11 @@ pub struct IntervalSummary {
 }
 
 impl TransmissionSummary {
+    /// Returns the unit of the damping.
+    pub fn damping_unit(&self) -> &'static str {
+        if self.inertia_unit == "kg" { "N.s/m" } else { "N.m.s/rad" }
+    }
+
     pub(super) fn new(fit: &TransmissionFit, kind: AxisKind) -> Self {
         let (inertia_unit, stiffness_unit, stiffness, length) = match kind {
             AxisKind::Linear => ("kg", "N/um", NEWTON_PER_MICROMETER, MICROMETER),

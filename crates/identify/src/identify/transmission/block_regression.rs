@@ -72,6 +72,24 @@ impl BlockRegression {
         solution.iter().all(|x| x.is_finite()).then_some(solution)
     }
 
+    /// Returns the part of the squares of a column that the other ones of the first `count` columns do not explain, 0 … 1.
+    pub fn independence(&self, count: usize, column: usize) -> f64 {
+        let (mut normal, _) = self.sums(count, None);
+        let scale = normal.diagonal().map(|square| if square > 0.0 { 1.0 / square.sqrt() } else { 0.0 });
+        for i in 0..count {
+            for j in 0..count {
+                normal[(i, j)] *= scale[i] * scale[j];
+            }
+        }
+        // Column `column` on the others.
+        let others = normal.clone().remove_row(column).remove_column(column);
+        let with = normal.column(column).clone_owned().remove_row(column);
+        match others.pseudo_inverse(RANK) {
+            Ok(inverse) if normal[(column, column)] > 0.0 => (1.0 - with.dot(&(inverse * &with))).max(0.0),
+            _ => 0.0,
+        }
+    }
+
     /// Returns the sum of the squared residuals of a solution.
     pub fn residual_squares(&self, solution: &DVector<f64>) -> f64 {
         let (normal, right) = self.sums(solution.len(), None);
@@ -113,6 +131,9 @@ mod tests {
         let solution = regression.solve(3, None).expect("a solution");
         assert!((solution[0] - 2.0).abs() < 0.01 && (solution[1] - 3.0).abs() < 0.01, "{solution}");
         assert_eq!(solution[2], 0.0);
+        // A quarter of the squares of a line from 0 is that about its mean; a column of zeros has none.
+        assert!((regression.independence(2, 1) - 0.25).abs() < 1e-3, "{}", regression.independence(2, 1));
+        assert_eq!(regression.independence(3, 2), 0.0);
         assert!((regression.residual_squares(&solution) - 10.0).abs() < 0.01);
         let (slope, without) = regression.jackknife(2, |c| c[1]).expect("a solution");
         assert!((slope - 3.0).abs() < 0.01 && scatter(&without) < 0.01);

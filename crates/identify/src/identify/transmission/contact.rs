@@ -15,6 +15,8 @@ const SETTLED: f64 = 1e-4;
 const CLEAR: f64 = 0.3;
 /// Share of the samples that must touch each flank of the gap.
 const TOUCHING: f64 = 0.01;
+/// Smallest part of the effect of the gap that friction, spring and damper do not explain.
+const INDEPENDENT: f64 = 0.01;
 /// Columns: contact, its derivative, constant, direction, velocity, friction law, sine and cosine of the position; then the derivatives by
 /// the middle of the gap and by half of its width.
 const LINEAR: usize = 8;
@@ -30,14 +32,23 @@ pub(super) struct ContactFit {
     pub stiffness: (f64, Vec<f64>),
     /// Damping relative to the inertia of the load, 1/s.
     pub damping: (f64, Vec<f64>),
-    /// Width of the gap, m or rad, without each of the blocks; none if both flanks are not touched.
-    pub widths: Option<Vec<f64>>,
+    /// Width of the gap, m or rad, without each of the blocks, or why it is unknown.
+    pub widths: Result<Vec<f64>, UnknownGap>,
     /// Standard deviation of the twist within the contact, m or rad.
     pub spread: f64,
     /// Coefficient of determination R² of the acceleration.
     pub r_squared: f64,
     /// Largest standard deviation of the twist by the encoders, m or rad.
     pub noise: f64,
+}
+
+/// Reason why the width of a gap is unknown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum UnknownGap {
+    /// One of the flanks is not touched.
+    OneFlank,
+    /// The flanks change with the direction of motion only, as the friction does.
+    LikeFriction,
 }
 
 /// Gap of the fit.
@@ -231,7 +242,13 @@ impl ContactSearch<'_> {
             gap,
             stiffness: (all[0], column(0)),
             damping: (all[1], column(1)),
-            widths: (columns == WITH_GAP).then(|| column(2)),
+            widths: match columns {
+                WITH_GAP if regression.independence(WITH_GAP, WITH_MIDDLE) < INDEPENDENT => {
+                    Err(UnknownGap::LikeFriction)
+                }
+                WITH_GAP => Ok(column(2)),
+                _ => Err(UnknownGap::OneFlank),
+            },
             spread: self.spread(gap),
             r_squared: 1.0 - regression.residual_squares(&solution) / total,
             noise: self.motions.iter().map(|motion| motion.noise).fold(0.0, f64::max),

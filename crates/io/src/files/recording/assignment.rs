@@ -92,6 +92,18 @@ impl Context<'_> {
         for (place, channel) in direct.iter_mut().zip(Channel::ALL) {
             *place = self.find(channel, &self.candidate_headers(channel, is_trace), columns, at)?;
         }
+        // A mapping may use the column of the motor's position for another channel.
+        let is_mapped =
+            |index: usize| Channel::ALL.get(index).is_some_and(|c| self.columns.mapping(*c).is_some());
+        for (index, channel) in Channel::ALL.into_iter().enumerate() {
+            let is_of_motor = matches!(channel, Channel::MotorPosition | Channel::WindUp);
+            let is_taken = |&(other, place): &(usize, &Option<usize>)| {
+                is_mapped(other) && place.is_some() && *place == direct[index]
+            };
+            if is_of_motor && !is_mapped(index) && direct.iter().enumerate().any(|pair| is_taken(&pair)) {
+                direct[index] = None;
+            }
+        }
         let found = if is_trace { &[] } else { found };
         let selector = Selector::new(self, found, direct.into_iter().flatten().collect(), at);
         for ((index, channel), direct) in Channel::ALL.into_iter().enumerate().zip(direct) {
