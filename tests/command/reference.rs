@@ -93,7 +93,7 @@ const DOCUMENTED: [(&str, &[&[&str]]); 11] = [
             &["tune", "x-there-and-back", "--controller", "cascade"],
         ],
     ),
-    ("bode", &[&["bode"]]),
+    ("bode", &[&["bode", "--set", "contour_control.gain=1"]]),
     ("learn", &[&["learn", "ballbar", "--iterations", "1", "--on", "x.position_loop.gain=2"]]),
     ("robustness", &[&["robustness", "corner-90"]]),
     ("pose", &[&["pose", "--joints", "x=0.1"]]),

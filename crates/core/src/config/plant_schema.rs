@@ -190,7 +190,7 @@ pub(super) const PLANT: &[ParameterDefinition] = &[
     ParameterDefinition::new("friction.presliding_elements", "", ParameterKind::Integer { min: 0, max: 10 })
         .of_axis()
         .default(Integer(0))
-        .describe("Number of elements of the friction before the axis slides (generalized Maxwell-slip model), which have the first loading curve of the LuGre model; 0: LuGre model; needs a presliding stiffness."),
+        .describe("Number of elements of the friction before the axis slides (generalized Maxwell-slip model), which follow the LuGre model after a reversal; 0: LuGre model; needs a presliding stiffness."),
     ParameterDefinition::number("friction.presliding_attraction_n_s", "N/s", 0.0, 1e12)
         .on(Linear)
         .default(Number(0.0))

@@ -93,6 +93,31 @@ fn the_first_loading_curve_has_points_of_that_of_the_bristles() {
     }
 }
 
+#[test]
+fn the_curve_of_an_axis_after_a_reversal_has_points_of_that_of_the_bristles() {
+    for count in 2..=10_u32 {
+        let elements = format!("x.friction.presliding_elements={count}");
+        let config = machine(&["x.friction.presliding_stiffness_n_um=50", &elements]);
+        let axis = &config.axes()[X];
+        let plant = Plant::new(axis, 1e-4).expect("can be discretized");
+        let own = MaxwellSlip::of_axis(axis, &plant, 1e-4).expect("elements");
+        let model = MaxwellSlip::new(own.elements(), None, 0.0, 1e-4, PER_FORCE);
+        let mut moved = MovedElements { model, state: MaxwellSlipState::default(), displacement: 0.0 };
+        // g/σ0.
+        let length = LAW / axis.presliding.expect("presliding").stiffness;
+        let start = 10.0 * length;
+        assert!((moved.move_to(start) - LAW).abs() < 1e-9);
+        for j in 1..count {
+            let level = f64::from(j) / f64::from(count);
+            let distance = -length * (1.0 - level).ln();
+            // g (1 − 2 exp(−σ0 u/g)) in the new direction.
+            let wanted = -LAW * (1.0 - 2.0 * (-distance / length).exp());
+            let force = moved.move_to(start - distance);
+            assert!((force - wanted).abs() < 1e-9, "{count} elements, knot {j}: {force} N, not {wanted} N");
+        }
+    }
+}
+
 /// Masing's rule: a curve after a reversal is the first loading curve, twice as large, until it meets the curve
 /// before the reversal before.
 #[test]

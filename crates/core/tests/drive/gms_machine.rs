@@ -109,7 +109,8 @@ fn a_held_axis_gives_way_under_a_load_and_returns_to_the_same_point() {
         };
         let axis = &config.axes()[X];
         let law = axis.motor.torque_constant * (axis.friction.a + axis.friction.c) / axis.transmission_ratio;
-        let (length, force) = (law / 50e6, law / 2.0);
+        // A first loading curve has half the length of the curve after a reversal, with the same slope.
+        let (length, force) = (law / (2.0 * 50e6), law / 2.0);
         // Knot 3 of 6 of the first loading curve; the branches after a reversal are twice as large (Masing).
         let there = position_after(0.0, force);
         let exact = length * 2.0_f64.ln();

@@ -1,6 +1,6 @@
 //! Identification of the transmission of random axes with both encoders: distribution of the errors and coverage of the intervals.
 //!
-//!     virtual_axes_transmission_study --seeds 7000..7200 [--list]
+//!     virtual_axes_transmission_study --seeds 8000..8200 [--list]
 
 use std::ops::Range;
 use std::process::ExitCode;
@@ -11,7 +11,7 @@ use virtual_axes_verification::transmission_study::TransmissionStudy;
 #[derive(Debug, Parser)]
 struct Arguments {
     /// Seeds of the random axes.
-    #[arg(long, default_value = "7000..7200", value_parser = parse_seeds)]
+    #[arg(long, default_value = "8000..8200", value_parser = parse_seeds)]
     seeds: Range<u64>,
     /// Print a line for each axis.
     #[arg(long)]
@@ -20,7 +20,7 @@ struct Arguments {
 
 fn parse_seeds(text: &str) -> Result<Range<u64>, String> {
     let parsed = text.split_once("..").and_then(|(from, to)| Some(from.parse().ok()?..to.parse().ok()?));
-    parsed.filter(|seeds| !seeds.is_empty()).ok_or_else(|| format!("{text} is no range such as 7000..7200"))
+    parsed.filter(|seeds| !seeds.is_empty()).ok_or_else(|| format!("{text} is no range such as 8000..8200"))
 }
 
 fn main() -> ExitCode {
