@@ -126,7 +126,7 @@ pub fn psec_mcap(data: &[u8]) {
 /// Asserts that all channels have the length of the time stamps, and conditions the recording.
 fn check_recording(read: (RawRecording, Vec<Finding>)) {
     let (raw, _) = read;
-    for channel in [&raw.psec, &raw.position, &raw.velocity, &raw.current] {
+    for channel in [&raw.psec, &raw.position, &raw.velocity, &raw.current, &raw.motor_position] {
         assert!(channel.as_ref().is_none_or(|values| values.len() == raw.time.len()));
     }
     match condition(&raw, &MACHINE.axes()[0], &MACHINE.periods(), &Conditioning::default()) {
