@@ -64,6 +64,11 @@ fn recording(machine: &MachineConfig, highest: f64) -> RawRecording {
 
 /// Identifies the transmission of X of the default machine, whose inertia is 20 % off.
 fn identified(raw: &RawRecording) -> (Identification, Parameters) {
+    identified_from(raw, 1)
+}
+
+/// Identifies the transmission from the same recording, given `times`.
+fn identified_from(raw: &RawRecording, times: usize) -> (Identification, Parameters) {
     let mut start = true_parameters();
     let source = ValueSource::named("the test");
     start.set("x.motor.inertia_kg_m2", Value::Double(0.8 * 0.028), &source).expect("in range");
@@ -72,7 +77,7 @@ fn identified(raw: &RawRecording) -> (Identification, Parameters) {
     let conditioning = Conditioning { current_lag: Some(0.0), ..Conditioning::default() };
     let signals = condition(raw, axis, &machine.periods(), &conditioning).expect("a recording").0;
     let options = IdentificationOptions::default();
-    let found = identify_with_transmission(&[], &[&signals], axis, &machine.periods(), &options);
+    let found = identify_with_transmission(&[], &vec![&signals; times], axis, &machine.periods(), &options);
     (found, start)
 }
 
@@ -145,6 +150,9 @@ fn a_motion_far_below_the_antiresonance_does_not_tell_the_masses() {
 #[test]
 fn swapped_encoders_and_equal_recordings_are_named() {
     let raw = recording(&elastic(TRUTH), 60.0);
+    let (once, twice) = (identified(&raw).0, identified_from(&raw, 2).0);
+    assert!(codes(&twice).contains(&"same-samples") && !codes(&once).contains(&"same-samples"));
+    assert_eq!(twice.transmission, once.transmission);
     let swapped =
         RawRecording { position: raw.motor_position.clone(), motor_position: raw.position.clone(), ..raw };
     let (found, _) = identified(&swapped);
