@@ -4,6 +4,7 @@
 //! - [`stress`] runs random trajectories and checks limits, friction, energy balance and following errors at every tick.
 //! - [`production_traces`] generates recordings of hidden axes in production.
 //! - [`presliding_study`] identifies the presliding of random axes.
+//! - [`transmission_study`] identifies the transmission of random axes.
 //! - [`fixtures`] contains test machines, recordings, tuning problems and temporary folders.
 //!
 //! The crate is a development dependency only and is not published.
@@ -26,8 +27,19 @@
 
 #![forbid(unsafe_code)]
 
+use std::ops::Range;
+
 pub mod fixtures;
 pub mod presliding_study;
 pub mod production_traces;
 pub mod stress;
 pub mod transmission_study;
+
+/// Parses the seeds of a study, `5000..5200`.
+///
+/// # Errors
+/// Returns the text of the error for anything but a range that is not empty.
+pub fn parse_seeds(text: &str) -> Result<Range<u64>, String> {
+    let parsed = text.split_once("..").and_then(|(from, to)| Some(from.parse().ok()?..to.parse().ok()?));
+    parsed.filter(|seeds| !seeds.is_empty()).ok_or_else(|| format!("{text} is no range such as 5000..5200"))
+}

@@ -46,11 +46,6 @@ pub struct PreslidingStudy {
     cases: Vec<PreslidingCase>,
 }
 
-/// Returns a random number between `low` and `high`, uniform in its logarithm.
-fn log_between(random: &mut RandomSource, low: f64, high: f64) -> f64 {
-    low * (high / low).powf(random.unit())
-}
-
 impl PreslidingStudy {
     /// Returns the cases so far.
     pub fn cases(&self) -> &[PreslidingCase] {
@@ -107,7 +102,7 @@ fn hidden(random: &mut RandomSource) -> Hidden {
         AxisKind::Linear => (2e-6, 80e-6),
         AxisKind::Rotary => (2e-3 * DEGREE, 80e-3 * DEGREE),
     };
-    let stiffness = level / log_between(random, low, high);
+    let stiffness = level / random.log_between(low, high);
     let mass = known.motor.inertia / (ratio * ratio);
     let damping = 2.0 * (stiffness * mass).sqrt() * random.between(0.0, 1.0) * random.below(2) as f64;
     let is_present = random.chance(0.75);
@@ -134,7 +129,7 @@ fn motion(random: &mut RandomSource, kind: AxisKind, tsp: f64) -> (String, Vec<f
         AxisKind::Linear => 1e-3,
         AxisKind::Rotary => DEGREE,
     };
-    let (size, period) = (log_between(random, 0.3, 4.0), log_between(random, 1.5, 8.0));
+    let (size, period) = (random.log_between(0.3, 4.0), random.log_between(1.5, 8.0));
     let rounds = 4 + random.below(7);
     let is_sine = random.chance(0.5);
     let at = |t: f64| {
@@ -155,7 +150,7 @@ fn study(seed: u64) -> PreslidingCase {
     let (config, axis) = (&hidden.config, hidden.axis);
     let kind = config.axes()[axis_index(config, axis)].kind();
     let (program, psec) = motion(&mut random, kind, seconds(config.periods().position));
-    let increment = log_between(&mut random, 0.02, 2.0);
+    let increment = random.log_between(0.02, 2.0);
     let noise = random.between(0.002, 0.04);
     let milliseconds = [1, 2, 6][random.below(3)];
     let disturbance = Disturbance {

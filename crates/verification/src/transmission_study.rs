@@ -53,11 +53,6 @@ pub struct TransmissionStudy {
     cases: Vec<TransmissionCase>,
 }
 
-/// Returns a random number between `low` and `high`, uniform in its logarithm.
-fn log_between(random: &mut RandomSource, low: f64, high: f64) -> f64 {
-    low * (high / low).powf(random.unit())
-}
-
 fn set(machine: &mut Parameters, axis: &str, key: &str, value: f64) {
     let text = format!("{axis}.{key}={value:e}");
     machine.set_text(&text, &ValueSource::named("the study")).expect("a value in range");
@@ -88,13 +83,13 @@ fn hidden(random: &mut RandomSource) -> Hidden {
     set(&mut guess, axis, "motor.inertia_kg_m2", known.motor.inertia * random.between(0.7, 1.4));
     let total = known.motor.inertia / known.transmission_ratio.powi(2);
     let load = total * random.between(0.25, 0.85);
-    let antiresonance = log_between(random, 20.0, 90.0);
+    let antiresonance = random.log_between(20.0, 90.0);
     let stiffness = load * (TAU * antiresonance).powi(2);
     let damping = 2.0 * random.between(0.01, 0.1) * (stiffness * load).sqrt();
     let is_linear = known.kind() == AxisKind::Linear;
     let unit = if is_linear { 1e-6 } else { 1e-3 * DEGREE };
     let has_gap = random.chance(0.5);
-    let backlash = if has_gap { unit * log_between(random, 2.0, 60.0) } else { 0.0 };
+    let backlash = if has_gap { unit * random.log_between(2.0, 60.0) } else { 0.0 };
     let load_friction = if random.chance(0.5) { random.unit() } else { 0.0 };
     let truth =
         random.chance(0.85).then_some(TrueTransmission { antiresonance, load, stiffness, damping, backlash });
@@ -143,7 +138,7 @@ fn motion(random: &mut RandomSource, kind: AxisKind, tsp: f64) -> (String, Vec<f
     let share = random.between(0.5, 0.9);
     let (low, high) = (random.between(1.0, 4.0), random.between(40.0, 80.0));
     let length = random.between(6.0, 16.0);
-    let (slow, period) = (unit * log_between(random, 1e-3, 4e-3), random.between(2.0, 4.0));
+    let (slow, period) = (unit * random.log_between(1e-3, 4e-3), random.between(2.0, 4.0));
     let rounds = 2.0;
     let reversals = rounds * period;
     // Steady motion that reverses each second within 0.1 s.
@@ -192,7 +187,7 @@ fn study(seed: u64) -> TransmissionCase {
     let kind = hidden.machine.axes()[axis_index(&hidden.machine, hidden.axis)].kind();
     let (program, psec) = motion(&mut random, kind, seconds(hidden.machine.periods().position));
     let unit = if kind == AxisKind::Linear { 1e-6 } else { 1e-3 * DEGREE };
-    let increments = [0, 1].map(|_| log_between(&mut random, 0.005, 0.5));
+    let increments = [0, 1].map(|_| random.log_between(0.005, 0.5));
     let noise = random.between(0.001, 0.02);
     let ticks = [2, 4, 8, 16][random.below(4)];
     let disturbance = Disturbance {

@@ -6,6 +6,7 @@ use std::ops::Range;
 use std::process::ExitCode;
 
 use clap::Parser;
+use virtual_axes_verification::parse_seeds;
 use virtual_axes_verification::transmission_study::TransmissionStudy;
 
 #[derive(Debug, Parser)]
@@ -16,11 +17,6 @@ struct Arguments {
     /// Print a line for each axis.
     #[arg(long)]
     list: bool,
-}
-
-fn parse_seeds(text: &str) -> Result<Range<u64>, String> {
-    let parsed = text.split_once("..").and_then(|(from, to)| Some(from.parse().ok()?..to.parse().ok()?));
-    parsed.filter(|seeds| !seeds.is_empty()).ok_or_else(|| format!("{text} is no range such as 8000..8200"))
 }
 
 fn main() -> ExitCode {

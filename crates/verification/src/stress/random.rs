@@ -45,6 +45,11 @@ impl RandomSource {
         low + (high - low) * self.unit()
     }
 
+    /// Returns a number between `low` and `high`, both above 0, uniform in its logarithm.
+    pub fn log_between(&mut self, low: f64, high: f64) -> f64 {
+        low * (high / low).powf(self.unit())
+    }
+
     /// Returns an integer in 0 … `count` − 1; 0 if `count` is 0.
     pub fn below(&mut self, count: usize) -> usize {
         ((u128::from(self.word()) * count as u128) >> 64) as usize
