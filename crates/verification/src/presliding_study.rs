@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::fmt;
 
-use virtual_axes_core::config::{AxisKind, MachineConfig, Parameters, ValueSource};
+use virtual_axes_core::config::{AxisKind, MachineConfig, Parameters};
 use virtual_axes_core::statistics::quantile;
 use virtual_axes_core::units::{DEGREE, MILLISECOND_NS, NEWTON_PER_MICROMETER, seconds};
 use virtual_axes_identify::identify::{
@@ -11,6 +11,7 @@ use virtual_axes_identify::identify::{
 };
 use virtual_axes_identify::recording::{Conditioning, condition};
 
+use crate::fixtures::machines::set;
 use crate::fixtures::recordings::{CurrentNoise, Disturbance, axis_index, record};
 use crate::stress::random::RandomSource;
 
@@ -73,11 +74,6 @@ struct Hidden {
     config: MachineConfig,
     stiffness: Option<f64>,
     damping: f64,
-}
-
-fn set(machine: &mut Parameters, axis: &str, key: &str, value: f64) {
-    let text = format!("{axis}.{key}={value:e}");
-    machine.set_text(&text, &ValueSource::named("the study")).expect("a value in range");
 }
 
 fn hidden(random: &mut RandomSource) -> Hidden {

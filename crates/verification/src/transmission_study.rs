@@ -11,6 +11,7 @@ use virtual_axes_identify::identify::{
 };
 use virtual_axes_identify::recording::{Conditioning, condition};
 
+use crate::fixtures::machines::set;
 use crate::fixtures::recordings::{CurrentNoise, Disturbance, axis_index, record};
 use crate::stress::random::RandomSource;
 
@@ -51,11 +52,6 @@ pub struct TransmissionCase {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TransmissionStudy {
     cases: Vec<TransmissionCase>,
-}
-
-fn set(machine: &mut Parameters, axis: &str, key: &str, value: f64) {
-    let text = format!("{axis}.{key}={value:e}");
-    machine.set_text(&text, &ValueSource::named("the study")).expect("a value in range");
 }
 
 /// Axis with hidden values.
