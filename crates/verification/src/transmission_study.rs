@@ -33,6 +33,8 @@ pub struct TrueTransmission {
     pub damping: f64,
     /// Width of the gap, m or rad.
     pub backlash: f64,
+    /// Share of the friction at the load.
+    pub load_friction: f64,
 }
 
 /// Result of one random axis.
@@ -87,8 +89,14 @@ fn hidden(random: &mut RandomSource) -> Hidden {
     let has_gap = random.chance(0.5);
     let backlash = if has_gap { unit * random.log_between(2.0, 60.0) } else { 0.0 };
     let load_friction = if random.chance(0.5) { random.unit() } else { 0.0 };
-    let truth =
-        random.chance(0.85).then_some(TrueTransmission { antiresonance, load, stiffness, damping, backlash });
+    let truth = random.chance(0.85).then_some(TrueTransmission {
+        antiresonance,
+        load,
+        stiffness,
+        damping,
+        backlash,
+        load_friction,
+    });
     if truth.is_some() {
         let (keys, per_unit, width) = match is_linear {
             true => (
@@ -225,13 +233,21 @@ fn study(seed: u64) -> TransmissionCase {
 type Quantity =
     (&'static str, fn(&TrueTransmission) -> f64, fn(&TransmissionFit) -> Option<ConfidenceInterval>);
 
-const QUANTITIES: [Quantity; 5] = [
+const QUANTITIES: [Quantity; 6] = [
     ("antiresonance", |t| t.antiresonance, |f| Some(f.antiresonance)),
     ("stiffness", |t| t.stiffness, |f| f.masses.as_ref().map(|m| m.stiffness)),
     ("inertia of the load", |t| t.load, |f| f.masses.as_ref().map(|m| m.load)),
     ("damping", |t| t.damping, |f| f.masses.as_ref().and_then(|m| m.damping)),
     ("backlash", |t| t.backlash, |f| f.backlash),
+    (LOAD_FRICTION, |t| t.load_friction, |f| f.masses.as_ref().and_then(|m| m.load_friction)),
 ];
+/// Quantity that can be 0: its error is not relative to its value.
+const LOAD_FRICTION: &str = "share of the friction at the load";
+
+/// Returns the error of a value of a quantity, %.
+fn error(name: &str, value: f64, truth: f64) -> f64 {
+    if name == LOAD_FRICTION { 100.0 * (value - truth) } else { 100.0 * (value / truth - 1.0) }
+}
 
 fn contains(interval: &ConfidenceInterval, truth: f64) -> bool {
     (interval.bounds[0]..=interval.bounds[1]).contains(&truth)
@@ -253,7 +269,7 @@ impl fmt::Display for TransmissionCase {
             let half = (interval.bounds[1] - interval.bounds[0]) / 2.0;
             write!(f, "{name} {:.4e} ± {:.1} %", interval.value, 100.0 * half / interval.value)?;
             if let Some(truth) = self.truth {
-                let error = 100.0 * (interval.value / of(&truth) - 1.0);
+                let error = error(name, interval.value, of(&truth));
                 let is_inside = contains(&interval, of(&truth));
                 write!(f, " ({error:+.1} %{})", if is_inside { "" } else { " OUTSIDE" })?;
             }
@@ -286,7 +302,7 @@ impl fmt::Display for TransmissionStudy {
                 .filter_map(|(case, truth)| Some((of(&truth), case.found.as_ref().and_then(value)?)))
                 .collect();
             let mut errors: Vec<f64> =
-                found.iter().map(|(truth, i)| 100.0 * (i.value / truth - 1.0).abs()).collect();
+                found.iter().map(|(truth, i)| error(name, i.value, *truth).abs()).collect();
             let inside = found.iter().filter(|(truth, i)| contains(i, *truth)).count();
             let mut at = |q: f64| quantile(&mut errors, q).unwrap_or(f64::NAN);
             let row = [at(0.5), at(0.9), at(1.0)];

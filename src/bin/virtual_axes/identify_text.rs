@@ -291,11 +291,12 @@ fn transmission(found: &TransmissionSummary, length: &str) -> String {
         ("damping", &found.damping, found.damping_unit()),
         ("load", &found.load_inertia, found.inertia_unit),
         ("motor and load", &found.total_inertia, found.inertia_unit),
+        ("share of the friction at the load", &found.load_friction, ""),
         ("backlash", &found.backlash, length),
     ];
     for (name, value, unit) in named {
         if let Some(value) = value {
-            text.push_str(&format!("; {name} {} {unit}", interval(value)));
+            text.push_str(format!("; {name} {} {unit}", interval(value)).trim_end());
         }
     }
     if let Some(bound) = found.excluded_backlash {

@@ -1,17 +1,13 @@
-//! Friction with presliding by elements (generalized Maxwell-slip model): closed forms, the equations of its authors,
-//! and energy.
+//! Friction with presliding by elements (generalized Maxwell-slip model): closed forms and energy.
 
 use std::f64::consts::TAU;
 
 use proptest::prelude::*;
 use virtual_axes_core::config::{MachineConfig, PreslidingConfig};
 use virtual_axes_core::drive::{
-    Friction, LoadState, MaxwellSlip, MaxwellSlipElement, MaxwellSlipState, MotorState, Plant, Presliding,
+    LoadState, MaxwellSlip, MaxwellSlipElement, MaxwellSlipState, MotorState, Plant, Presliding,
 };
 use virtual_axes_verification::fixtures::machines::configured_with;
-
-use crate::parameter_ranges::golden;
-use crate::presliding::published_axis;
 
 const X: usize = 0;
 /// σ0, N/m.
@@ -19,36 +15,46 @@ const STIFFNESS: f64 = 1e5;
 /// Sliding friction without velocity dependence, N.
 const LAW: f64 = 1.2;
 /// Displacement per force over a tick of moved elements: friction hardly changes the displacement.
-const PER_FORCE: f64 = 1e-18;
+pub(crate) const PER_FORCE: f64 = 1e-18;
 
 fn machine(changes: &[&str]) -> MachineConfig {
     configured_with("mikron_ucp710", &[], changes)
 }
 
 /// Elements on a support that is moved.
-struct MovedElements {
+pub(crate) struct MovedElements {
     model: MaxwellSlip,
     state: MaxwellSlipState,
+    /// Sliding friction, N.
+    law: f64,
     displacement: f64,
+    /// Work on the elements, J.
+    pub(crate) work: f64,
 }
 
 impl MovedElements {
     fn new(count: usize) -> Self {
-        let elements = MaxwellSlipElement::of_loading_curve(count, STIFFNESS);
-        let model = MaxwellSlip::new(&elements, None, 0.0, 1e-4, PER_FORCE);
-        MovedElements { model, state: MaxwellSlipState::default(), displacement: 0.0 }
+        Self::of(&MaxwellSlipElement::of_loading_curve(count, STIFFNESS), LAW)
+    }
+
+    pub(crate) fn of(elements: &[MaxwellSlipElement], law: f64) -> Self {
+        let model = MaxwellSlip::new(elements, None, 0.0, 1e-4, PER_FORCE);
+        MovedElements { model, state: MaxwellSlipState::default(), law, displacement: 0.0, work: 0.0 }
     }
 
     /// Moves the support to a displacement in 100 steps and returns the force, N.
-    fn move_to(&mut self, displacement: f64) -> f64 {
+    pub(crate) fn move_to(&mut self, displacement: f64) -> f64 {
+        let force = |state: &MaxwellSlipState| state.forces.iter().sum::<f64>();
         let from = self.displacement;
         for step in 1..=100 {
             let next = from + (displacement - from) * f64::from(step) / 100.0;
             let distance = next - self.displacement;
-            self.model.step(distance, PER_FORCE * LAW, distance / 1e-4, &mut self.state);
+            let before = force(&self.state);
+            self.model.step(distance, PER_FORCE * self.law, distance / 1e-4, &mut self.state);
+            self.work += distance * (before + force(&self.state)) / 2.0;
             self.displacement = next;
         }
-        self.state.forces.iter().sum()
+        force(&self.state)
     }
 
     /// Returns the force of the first loading at a displacement, N.
@@ -101,8 +107,7 @@ fn the_curve_of_an_axis_after_a_reversal_has_points_of_that_of_the_bristles() {
         let axis = &config.axes()[X];
         let plant = Plant::new(axis, 1e-4).expect("can be discretized");
         let own = MaxwellSlip::of_axis(axis, &plant, 1e-4).expect("elements");
-        let model = MaxwellSlip::new(own.elements(), None, 0.0, 1e-4, PER_FORCE);
-        let mut moved = MovedElements { model, state: MaxwellSlipState::default(), displacement: 0.0 };
+        let mut moved = MovedElements::of(own.elements(), LAW);
         // g/σ0.
         let length = LAW / axis.presliding.expect("presliding").stiffness;
         let start = 10.0 * length;
@@ -219,125 +224,6 @@ fn an_axis_does_not_creep_under_a_vibrating_load() {
     let drift = |means: &[f64]| 1e9 * (means[199] - means[20]);
     println!("drift over 180 periods: elements {:.2e} nm, bristles {:.0} nm", drift(&found), drift(&lugre));
     assert!(drift(&found).abs() < 1e-3 && drift(&lugre) > 1000.0, "{found:?}");
-}
-
-/// Elements of `tools/golden_gms.py`.
-const ELEMENTS: [MaxwellSlipElement; 4] = [
-    MaxwellSlipElement { stiffness: 5e4, share: 0.2 },
-    MaxwellSlipElement { stiffness: 2.5e4, share: 0.25 },
-    MaxwellSlipElement { stiffness: 1.5e4, share: 0.25 },
-    MaxwellSlipElement { stiffness: 1e4, share: 0.3 },
-];
-const ATTRACTION: f64 = 40.0;
-
-/// Largest differences to the golden rows of a case, relative to the largest values: position, friction.
-#[derive(Default)]
-struct Difference {
-    worst: [f64; 2],
-    largest: [f64; 2],
-}
-
-impl Difference {
-    fn add(&mut self, found: [f64; 2], exact: [f64; 2]) {
-        for k in 0..2 {
-            self.worst[k] = self.worst[k].max((found[k] - exact[k]).abs());
-            self.largest[k] = self.largest[k].max(exact[k].abs());
-        }
-    }
-
-    fn relative(&self) -> [f64; 2] {
-        [self.worst[0] / self.largest[0], self.worst[1] / self.largest[1]]
-    }
-}
-
-/// Simulates a mass of 1 kg under `force(time, position)` until the times of the golden rows of a case.
-fn errors_with_mass(case: f64, viscosity: f64, period: f64, force: impl Fn(f64, f64) -> f64) -> [f64; 2] {
-    let per_force = period * period / 2.0;
-    let (law, _) = Friction::of_axis(&published_axis(), 1.0).of_presliding();
-    let model = MaxwellSlip::new(&ELEMENTS, Some(ATTRACTION), viscosity, period, per_force);
-    let mut state = MaxwellSlipState::default();
-    let (mut position, mut speed, mut step) = (0.0, 0.0, 0);
-    let mut difference = Difference::default();
-    for row in golden("gms.csv").iter().filter(|row| row[0] == case) {
-        let mut friction = 0.0;
-        while (f64::from(step) + 0.5) * period < row[1] {
-            let outer = force((f64::from(step) + 0.5) * period, position + period / 2.0 * speed);
-            let free = period * speed + per_force * outer;
-            let drop = model.step(free, per_force * law.bound(speed), speed, &mut state);
-            friction = drop / per_force;
-            position += free - drop;
-            speed += period * (outer - friction);
-            step += 1;
-        }
-        difference.add([position, friction], [row[2], row[4]]);
-    }
-    difference.relative()
-}
-
-fn two_frequencies(time: f64, _position: f64) -> f64 {
-    let angle = TAU * time / 4.0;
-    1.9 * (0.65 * angle.sin() + 0.35 * (3.0 * angle).sin())
-}
-
-#[test]
-fn presliding_under_two_frequencies_converges_to_the_equations_of_the_authors() {
-    let errors = [1e-4, 5e-5, 2.5e-5].map(|period| errors_with_mass(0.0, 200.0, period, two_frequencies));
-    println!(
-        "two frequencies, relative errors of position and friction at 0.1, 0.05 and 0.025 ms: {errors:?}"
-    );
-    for k in 0..2 {
-        assert!(errors[1][k] < 1e-2, "{errors:?}");
-        assert!((errors[1][k] / errors[2][k] - 2.0).abs() < 0.3, "{errors:?}");
-    }
-}
-
-/// The forces of slipping elements are limited as in case 3; without the limit (case 1) the equations of the authors
-/// can supply energy at the end of a slip.
-#[test]
-fn stick_slip_converges_to_the_equations_with_limited_growth() {
-    let spring = |time: f64, position: f64| 200.0 * (0.001 * time - position);
-    let errors = [1e-4, 5e-5, 2.5e-5].map(|period| errors_with_mass(3.0, 40.0, period, spring));
-    let unlimited = errors_with_mass(1.0, 40.0, 2.5e-5, spring);
-    println!("stick-slip, relative errors of position and friction at 0.1, 0.05 and 0.025 ms: {errors:?}");
-    println!("stick-slip, relative differences to the equations without limit at 0.025 ms: {unlimited:?}");
-    for k in 0..2 {
-        assert!(errors[1][k] < 1e-2, "{errors:?}");
-        assert!((errors[1][k] / errors[2][k] - 2.0).abs() < 0.4, "{errors:?}");
-        assert!(unlimited[k] < 0.02, "{unlimited:?}");
-    }
-}
-
-/// Returns the largest difference of the friction at a sinusoidal velocity, relative to the largest; the elements
-/// follow the law at once without an `attraction`.
-fn lag_error(period: f64, attraction: Option<f64>) -> f64 {
-    let (law, _) = Friction::of_axis(&published_axis(), 1.0).of_presliding();
-    let model = MaxwellSlip::new(&ELEMENTS, attraction, 0.4, period, PER_FORCE);
-    let mut state = MaxwellSlipState::default();
-    let position = |time: f64| 1.5e-3 * time + 1.2e-3 / TAU * (1.0 - (TAU * time).cos());
-    let velocity = |time: f64| 1.5e-3 + 1.2e-3 * (TAU * time).sin();
-    let (mut difference, mut step) = (Difference::default(), 0);
-    for row in golden("gms.csv").iter().filter(|row| row[0] == 2.0) {
-        while (f64::from(step) + 0.5) * period < row[1] {
-            let [from, to] = [step, step + 1].map(|k| f64::from(k) * period);
-            let (distance, speed) = (position(to) - position(from), velocity(from));
-            model.step(distance, PER_FORCE * law.bound(speed), speed, &mut state);
-            step += 1;
-        }
-        let friction = state.forces.iter().sum::<f64>() + 0.4 * velocity(row[1]);
-        difference.add([position(row[1]), friction], [row[2], row[4]]);
-    }
-    difference.relative()[1]
-}
-
-#[test]
-fn frictional_lag_converges_to_the_equations_of_the_authors() {
-    let errors = [4e-4, 2e-4, 1e-4, 5e-5].map(|period| lag_error(period, Some(ATTRACTION)));
-    let without = lag_error(5e-5, None);
-    println!("lag, relative errors of friction at 0.4 to 0.05 ms: {errors:?}, without attraction {without}");
-    assert!(errors[3] < 1e-3 && without > 0.02, "{errors:?}, {without}");
-    for pair in errors.windows(2) {
-        assert!((pair[0] / pair[1] - 2.0).abs() < 0.3, "{errors:?}");
-    }
 }
 
 /// Trajectories of a plant in the energy test: 1 million in all.

@@ -40,6 +40,11 @@ const UNCERTAIN: f64 = 0.5;
 const SYSTEMATIC: [f64; 2] = [0.005, 0.0];
 const WITH_CURRENT: [f64; 2] = [0.007, 0.36];
 const OF_DAMPING: [f64; 2] = [0.06, 0.36];
+/// Delay between the encoders that is reported, s and in standard errors.
+const DELAY: f64 = 5e-5;
+const DELAY_ERRORS: f64 = 3.0;
+/// Largest half of the 95 % interval of the share of friction at the load.
+const UNCERTAIN_SHARE: f64 = 0.25;
 /// Standard errors of a 95 % interval.
 const INTERVAL: f64 = 1.96;
 /// Standard error of the width of the gap that all blocks share, relative to the twist by the encoders, to the spread of
@@ -64,6 +69,14 @@ impl ConfidenceInterval {
     /// Returns the standard deviation of a normal distribution with the width of the interval.
     pub fn error(&self) -> f64 {
         (self.bounds[1] - self.bounds[0]) / (2.0 * INTERVAL)
+    }
+
+    /// Returns the interval within 0 … 1; none if it is too wide, or outside.
+    fn as_share(self) -> Option<Self> {
+        let [low, high] = self.bounds;
+        let is_share = high - low <= 2.0 * UNCERTAIN_SHARE && low <= 1.0 && high >= 0.0;
+        let within = |x: f64| x.clamp(0.0, 1.0);
+        is_share.then(|| ConfidenceInterval { value: within(self.value), bounds: self.bounds.map(within) })
     }
 
     fn is_certain(&self) -> bool {
@@ -97,6 +110,15 @@ pub struct MassesFit {
     pub stiffness: ConfidenceInterval,
     /// Damping d, N·s/m or N·m·s/rad; none if it is not above 0.
     pub damping: Option<ConfidenceInterval>,
+    /// Share of the friction that acts at the load, 0 … 1; none if the recordings do not determine it.
+    pub load_friction: Option<ConfidenceInterval>,
+}
+
+impl MassesFit {
+    /// Returns the share of the friction at the load, 0 if its interval contains 0; none if it is not determined.
+    pub(super) fn load_friction_share(&self) -> Option<f64> {
+        self.load_friction.map(|share| if share.bounds[0] > 0.0 { share.value } else { 0.0 })
+    }
 }
 
 impl TransmissionFit {
@@ -112,7 +134,7 @@ impl TransmissionFit {
             damping: masses.damping.map_or(kept(|t| t.damping), |damping| damping.value * square),
             load_inertia: masses.load.value * square,
             backlash: backlash.unwrap_or(kept(|t| t.backlash)),
-            load_friction: kept(|t| t.load_friction),
+            load_friction: masses.load_friction_share().unwrap_or(kept(|t| t.load_friction)),
             structure: before.and_then(|before| before.structure),
         });
     }
@@ -169,6 +191,24 @@ pub(super) fn fit_transmission(
     }
 }
 
+/// Returns the finding about encoders that are not sampled at the same instant.
+fn delay_finding(contact: &ContactFit) -> Option<Finding> {
+    let (delay, error) = (contact.delay.0, scatter(&contact.delay.1));
+    (delay.abs() > DELAY.max(DELAY_ERRORS * error)).then(|| {
+        let side = if delay > 0.0 { "older" } else { "newer" };
+        Finding::warning(
+            "encoder-delay",
+            format!(
+                "position is {:.2} ± {:.2} ms {side} than motor_position in the same row: the twist contains a part of the velocity, and \
+                 the damping is not reliable",
+                1e3 * delay.abs(),
+                1e3 * student(BLOCKS - 1) * error
+            ),
+            "sample both encoders at the same instant, or move one of the columns by this time",
+        )
+    })
+}
+
 struct TransmissionSearch<'a> {
     motions: &'a [TwoEncoderMotion],
     axis: &'a AxisConfig,
@@ -202,6 +242,7 @@ impl TransmissionSearch<'_> {
         if !is_seen || !antiresonance.is_certain() {
             return Err(self.too_stiff(contact, antiresonance, is_seen));
         }
+        findings.extend(delay_finding(contact));
         if contact.r_squared < EXPLAINED {
             return Err(Finding::missing(
                 "poor-transmission",
@@ -212,7 +253,7 @@ impl TransmissionSearch<'_> {
                 "check units and signs of both positions; a structure that vibrates is not modeled",
             ));
         }
-        match free.widths {
+        match &free.widths {
             Ok(_) => {}
             Err(UnknownGap::OneFlank) => findings.push(Finding::warning(
                 "one-flank",
@@ -226,7 +267,14 @@ impl TransmissionSearch<'_> {
             )),
         }
         let excluded_backlash = gap.filter(|_| !is_open).map(|gap| gap.bounds[1].max(0.0));
-        let masses = self.masses(contact);
+        // A gap that is unknown acts as friction at the load.
+        let width_error = match (gap, &free.widths) {
+            (Some(gap), _) if is_open => Some(gap.bounds[1] - gap.value),
+            (Some(gap), _) => Some(gap.bounds[1].max(0.0)),
+            (None, Err(UnknownGap::OneFlank)) => Some(0.0),
+            (None, _) => None,
+        };
+        let masses = self.masses(contact, width_error);
         if masses.is_none() {
             findings.push(Finding::missing(
                 "no-load-inertia",
@@ -241,6 +289,11 @@ impl TransmissionSearch<'_> {
         if masses.as_ref().is_some_and(|masses| masses.damping.is_none()) {
             let what = "the recordings do not determine the damping of the transmission: it is unchanged";
             findings.push(Finding::note("transmission-damping", what));
+        }
+        if masses.as_ref().is_some_and(|masses| masses.load_friction.is_none()) {
+            let what =
+                "the recordings do not determine the share of the friction at the load: it is unchanged";
+            findings.push(Finding::note("load-friction", what));
         }
         Ok(TransmissionFit {
             antiresonance,
@@ -315,13 +368,14 @@ impl TransmissionSearch<'_> {
         ConfidenceInterval::about(value, half)
     }
 
-    /// Returns the masses; none if the current does not tell them apart.
-    fn masses(&self, contact: &ContactFit) -> Option<MassesFit> {
+    /// Returns the masses; none if the current does not tell them apart. `width_error` is that of the gap, m or rad, none if
+    /// the gap is unknown.
+    fn masses(&self, contact: &ContactFit, width_error: Option<f64>) -> Option<MassesFit> {
         let total: usize = self.motions.iter().map(|motion| motion.samples().len()).sum();
         // Accelerations of load and twist, friction, velocity, constant, sine and cosine of the position.
         let mut regression = BlockRegression::new(7, BLOCKS);
         let has_tilt = self.axis.kind() == AxisKind::Rotary;
-        let (mut k, mut squares) = (0, [0.0; 2]);
+        let (mut k, mut squares, mut law) = (0, [0.0; 2], [0.0; 2]);
         for motion in self.motions {
             for i in motion.samples() {
                 k += 1;
@@ -341,9 +395,13 @@ impl TransmissionSearch<'_> {
                 regression.add((k - 1) * BLOCKS / total, &row, force);
                 squares[0] += row[0] * row[0];
                 squares[1] += row[1] * row[1];
+                law[0] += row[2] * row[3];
+                law[1] += row[2] * row[2];
             }
         }
-        let (all, without) = regression.jackknife(7, |c| [c[0], c[1]])?;
+        // All of the friction as a part of the friction law.
+        let along_law = if law[1] > 0.0 { law[0] / law[1] } else { 0.0 };
+        let (all, without) = regression.jackknife(7, |c| [c[0], c[1], c[2] + c[3] * along_law])?;
         let load = (all[0] - all[1], without.iter().map(|c| c[0] - c[1]).collect::<Vec<f64>>());
         let sum = (all[0], without.iter().map(|c| c[0]).collect());
         let product = |of_load: &(f64, Vec<f64>)| {
@@ -351,12 +409,20 @@ impl TransmissionSearch<'_> {
             (of_load.0 * load.0, parts.collect::<Vec<f64>>())
         };
         let (stiffness, damping) = (product(&contact.stiffness), product(&contact.damping));
+        let friction = product(&contact.load_friction);
         // Forces that the equation does not contain act as an inertia of the load if motor and load move as one.
         let by_forces = UNMODELED * all[0] / load.0 * f64::sqrt(squares[0] / squares[1]);
         let of_load = [WITH_CURRENT[0].hypot(by_forces), WITH_CURRENT[1]];
         let [stiffness, load] = [stiffness, load].map(|value| self.interval(&value, of_load, |x| x));
         let total = self.interval(&sum, WITH_CURRENT, |x| x);
         let damping = self.interval(&damping, OF_DAMPING, |x| x);
+        let share = width_error.filter(|_| all[2] > 0.0).map(|error| {
+            let of_all = without.iter().zip(&friction.1).map(|(c, part)| part / c[2]).collect();
+            let share = self.interval(&(friction.0 / all[2], of_all), of_load, |x| x);
+            let half = (share.bounds[1] - share.value)
+                .hypot(error * contact.friction_by_width * load.value / all[2]);
+            ConfidenceInterval::about(share.value, half)
+        });
         let is_certain = [load, total, stiffness].iter().all(ConfidenceInterval::is_certain);
         let is_possible = load.value > 0.0 && load.value < total.value;
         (is_certain && is_possible).then_some(MassesFit {
@@ -364,6 +430,7 @@ impl TransmissionSearch<'_> {
             total,
             stiffness,
             damping: Some(damping).filter(|damping| damping.bounds[0] > 0.0),
+            load_friction: share.and_then(ConfidenceInterval::as_share),
         })
     }
 }

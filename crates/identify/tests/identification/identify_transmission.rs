@@ -15,13 +15,15 @@ use virtual_axes_verification::transmission_study::TransmissionStudy;
 
 /// Stiffness (N/µm), damping (N·s/m), load (kg) and backlash (µm) of X.
 const TRUTH: [f64; 4] = [150.0, 15000.0, 1300.0, 9.0];
+/// Share of the friction of X at the load.
+const FRICTION_AT_LOAD: f64 = 0.5;
 const KEYS: [&str; 4] = ["stiffness_n_um", "damping_n_s_m", "load_mass_kg", "backlash_um"];
 
 /// Returns a machine whose X has a transmission with `values`.
 fn elastic(values: [f64; 4]) -> MachineConfig {
     let source = ValueSource::named("the test");
     let texts = KEYS.iter().zip(values).map(|(key, value)| format!("x.transmission.{key}={value}"));
-    let friction = ["x.transmission.load_friction=0.5".to_owned()];
+    let friction = [format!("x.transmission.load_friction={FRICTION_AT_LOAD}")];
     let assignments = texts.chain(friction).map(|text| parse_assignment(&text, &source).expect("good"));
     let mut parameters = true_parameters();
     parameters.set_all(assignments.collect()).expect("values in range");
@@ -102,6 +104,10 @@ fn stiffness_load_damping_and_backlash_are_within_their_intervals_and_go_to_the_
     let antiresonance = (150e6_f64 / 1300.0).sqrt() / TAU;
     assert!((fit.antiresonance.value / antiresonance - 1.0).abs() < 2e-3, "{:?}", fit.antiresonance);
     assert!(fit.r_squared > 0.999, "{}", fit.r_squared);
+    let share = masses.load_friction.expect("a share of the friction");
+    println!("load_friction: {share:?}, true {FRICTION_AT_LOAD}");
+    assert!(share.bounds[0] < FRICTION_AT_LOAD && FRICTION_AT_LOAD < share.bounds[1], "{share:?}");
+    assert!(share.bounds[1] - share.bounds[0] < 0.2, "{share:?}");
     // The machine file has the true inertia of motor and load, too.
     let mut machine = start.clone();
     update_parameters(&mut machine, "x", &found.values(&start, "x")).expect("values in range");
@@ -111,6 +117,7 @@ fn stiffness_load_damping_and_backlash_are_within_their_intervals_and_go_to_the_
     let transmission = axis.transmission.expect("an elastic axis");
     let square = axis.transmission_ratio * axis.transmission_ratio;
     assert!((transmission.stiffness / (masses.stiffness.value * square) - 1.0).abs() < 1e-3);
+    assert!((transmission.load_friction - share.value).abs() < 1e-4);
     assert!((transmission.backlash * axis.transmission_ratio / gap.value - 1.0).abs() < 1e-2);
 }
 
@@ -159,6 +166,52 @@ fn swapped_encoders_and_equal_recordings_are_named() {
     assert_eq!(found.transmission, None);
     let mut texts = found.findings.iter().map(ToString::to_string);
     assert!(texts.any(|text| text.contains("motor_position is that of the motor")), "{:?}", found.findings);
+}
+
+#[test]
+fn encoders_that_are_not_sampled_at_the_same_instant_are_named() {
+    let raw = recording(&elastic(TRUTH), 60.0);
+    assert!(!codes(&identified(&raw).0).contains(&"encoder-delay"));
+    // Of a sampling period of 0.5 ms: the first row keeps its sample.
+    let delayed = |channel: &[f64]| -> Vec<f64> {
+        channel.iter().take(1).chain(channel).take(channel.len()).copied().collect()
+    };
+    let motor = raw.motor_position.clone().expect("a position of the motor");
+    let cases = [
+        (
+            RawRecording { position: raw.position.as_deref().map(delayed), ..raw.clone() },
+            "older than motor_position",
+        ),
+        (RawRecording { motor_position: Some(delayed(&motor)), ..raw }, "newer than motor_position"),
+    ];
+    for (raw, wanted) in cases {
+        let (found, _) = identified(&raw);
+        let texts: Vec<String> = found.findings.iter().map(ToString::to_string).collect();
+        // "position is 0.59 ± 0.26 ms older than …": the interval contains a sampling period.
+        let words: Vec<&str> = texts.iter().find(|t| t.contains(wanted)).expect(wanted).split(' ').collect();
+        let [delay, half] = [words[2], words[4]].map(|word| word.parse::<f64>().expect(word));
+        println!("{delay} ± {half} ms {wanted}");
+        assert!((delay - 0.5).abs() < half && half < 0.3, "{texts:?}");
+        // The rest hardly depends on it.
+        let masses = found.transmission.and_then(|fit| fit.masses).unwrap_or_else(|| panic!("{texts:?}"));
+        for (interval, truth) in [(masses.stiffness, 150e6), (masses.load, 1300.0)] {
+            assert!((interval.value / truth - 1.0).abs() < 0.05, "{interval:?}");
+        }
+    }
+}
+
+#[test]
+fn a_motion_that_no_spring_explains_gets_no_transmission() {
+    // A vibration of the motor's encoder by 40 µm at 70 Hz.
+    let mut raw = recording(&elastic(TRUTH), 60.0);
+    let times = raw.time.clone();
+    for (at, time) in raw.motor_position.as_mut().expect("a position of the motor").iter_mut().zip(times) {
+        *at += 40e-6 * (TAU * 70.0 * time).sin();
+    }
+    let (found, start) = identified(&raw);
+    assert_eq!(found.transmission, None);
+    assert!(codes(&found).contains(&"poor-transmission"), "{:?}", found.findings);
+    assert!(found.values(&start, "x").is_empty());
 }
 
 #[test]

@@ -35,6 +35,8 @@ impl Step {
             | "gap-or-friction"
             | "no-load-inertia"
             | "same-samples"
+            | "encoder-delay"
+            | "load-friction"
             | "transmission-damping" => &[Step::Transmission],
             "saturated-current" | "no-acceleration" | "negative-inertia" | "unseen-current" => {
                 &[Step::Inertia]

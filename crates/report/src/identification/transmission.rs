@@ -21,12 +21,13 @@ pub(super) fn section(page: &IdentificationPage) -> Option<Section> {
         found.r_squared,
     ));
     let length = page.error_unit().symbol;
-    let rows: [(&str, Option<&IntervalSummary>, &str); 6] = [
+    let rows: [(&str, Option<&IntervalSummary>, &str); 7] = [
         ("antiresonance", Some(&found.antiresonance_hz), "Hz"),
         ("stiffness", found.stiffness.as_ref(), found.stiffness_unit),
         ("damping", found.damping.as_ref(), found.damping_unit()),
         ("inertia of the load", found.load_inertia.as_ref(), found.inertia_unit),
         ("inertia of motor and load", found.total_inertia.as_ref(), found.inertia_unit),
+        ("share of the friction at the load", found.load_friction.as_ref(), ""),
         ("backlash", found.backlash.as_ref(), length),
     ];
     let rows = rows.into_iter().filter_map(|(name, value, unit)| {

@@ -1,6 +1,6 @@
 //! Identification of the transmission of random axes with both encoders: distribution of the errors and coverage of the intervals.
 //!
-//!     virtual_axes_transmission_study --seeds 8000..8200 [--list]
+//!     virtual_axes_transmission_study --seeds 9000..9200 [--list]
 
 use std::ops::Range;
 use std::process::ExitCode;
@@ -12,7 +12,7 @@ use virtual_axes_verification::transmission_study::TransmissionStudy;
 #[derive(Debug, Parser)]
 struct Arguments {
     /// Seeds of the random axes.
-    #[arg(long, default_value = "8000..8200", value_parser = parse_seeds)]
+    #[arg(long, default_value = "9000..9200", value_parser = parse_seeds)]
     seeds: Range<u64>,
     /// Print a line for each axis.
     #[arg(long)]

@@ -23,6 +23,8 @@ pub struct TransmissionSummary {
     pub stiffness_unit: &'static str,
     /// Damping, N·s/m or N·m·s/rad.
     pub damping: Option<IntervalSummary>,
+    /// Share of the friction that acts at the load, 0 … 1; none if it is not determined.
+    pub load_friction: Option<IntervalSummary>,
     /// Backlash, µm or mdeg; none if it is not seen.
     pub backlash: Option<IntervalSummary>,
     /// Backlash that is excluded, µm or mdeg; none if there is one, or if it is unknown.
@@ -64,6 +66,7 @@ impl TransmissionSummary {
             stiffness: masses.map(|masses| scaled(masses.stiffness, stiffness)),
             stiffness_unit,
             damping: masses.and_then(|masses| masses.damping).map(|damping| scaled(damping, 1.0)),
+            load_friction: masses.and_then(|masses| masses.load_friction).map(|share| scaled(share, 1.0)),
             backlash: fit.backlash.map(|gap| scaled(gap, length)),
             excluded_backlash: fit.excluded_backlash.map(|bound| bound / length),
             r_squared: fit.r_squared,

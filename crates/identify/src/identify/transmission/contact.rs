@@ -20,6 +20,9 @@ const INDEPENDENT: f64 = 0.01;
 /// Columns: contact, its derivative, constant, direction, velocity, friction law, sine and cosine of the position; then the derivatives by
 /// the middle of the gap and by half of its width.
 const LINEAR: usize = 8;
+const DIRECTION: usize = 3;
+const VELOCITY: usize = 4;
+const FRICTION: usize = 5;
 const WITH_MIDDLE: usize = LINEAR + 1;
 const WITH_GAP: usize = LINEAR + 2;
 
@@ -32,6 +35,12 @@ pub(super) struct ContactFit {
     pub stiffness: (f64, Vec<f64>),
     /// Damping relative to the inertia of the load, 1/s.
     pub damping: (f64, Vec<f64>),
+    /// Force of the friction at the load relative to its inertia and to the friction law, 1/kg or 1/(kg·m²).
+    pub load_friction: (f64, Vec<f64>),
+    /// Error of `load_friction` by an error of the gap's width, 1/(N·s²).
+    pub friction_by_width: f64,
+    /// Time from the sample of the load's position to that of the motor's, s, if friction has no part in the twist by velocity.
+    pub delay: (f64, Vec<f64>),
     /// Width of the gap, m or rad, without each of the blocks, or why it is unknown.
     pub widths: Result<Vec<f64>, UnknownGap>,
     /// Standard deviation of the twist within the contact, m or rad.
@@ -223,12 +232,27 @@ impl ContactSearch<'_> {
         (sum[2] / sum[0] - (sum[1] / sum[0]).powi(2)).max(0.0).sqrt()
     }
 
+    /// Returns the projection of the direction of motion on the friction law, 1/N or 1/(N·m).
+    fn direction_along_law(&self) -> f64 {
+        let mut sum = [0.0; 2];
+        for motion in self.motions {
+            for i in motion.samples().filter(|i| motion.is_moving(*i)) {
+                sum[0] += motion.direction[i] * motion.load_friction[i];
+                sum[1] += motion.load_friction[i].powi(2);
+            }
+        }
+        if sum[1] > 0.0 { sum[0] / sum[1] } else { 0.0 }
+    }
+
     fn finish(&self, gap: [f64; 2]) -> Option<ContactFit> {
         let (regression, flanks) = self.regression(gap);
         let columns = self.columns(flanks);
+        let along_law = self.direction_along_law();
         let of = |c: &nalgebra::DVector<f64>| {
             let width = if columns == WITH_GAP { gap[1] + 2.0 * c[WITH_MIDDLE] / c[0] } else { gap[1] };
-            [c[0], c[1], width]
+            // The part of the direction that the friction law does not contain, as a part of the law.
+            let friction = c[FRICTION] + c[DIRECTION] * along_law;
+            [c[0], c[1], width, -friction, -c[VELOCITY] / c[0]]
         };
         let (all, without) = regression.jackknife(columns, of)?;
         let column = |k: usize| without.iter().map(|values| values[k]).collect::<Vec<f64>>();
@@ -242,6 +266,9 @@ impl ContactSearch<'_> {
             gap,
             stiffness: (all[0], column(0)),
             damping: (all[1], column(1)),
+            load_friction: (all[3], column(3)),
+            friction_by_width: all[0] * along_law.abs() / 2.0,
+            delay: (all[4], column(4)),
             widths: match columns {
                 WITH_GAP if regression.independence(WITH_GAP, WITH_MIDDLE) < INDEPENDENT => {
                     Err(UnknownGap::LikeFriction)

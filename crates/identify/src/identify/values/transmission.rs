@@ -5,7 +5,7 @@ use super::{INTERVAL, ValueSink};
 use virtual_axes_core::units::{DEGREE, MICROMETER, NEWTON_PER_MICROMETER};
 
 impl Identification {
-    /// Adds stiffness, damping, inertia of the load and backlash; what the recordings do not determine is unchanged.
+    /// Adds stiffness, damping, inertia of the load, backlash and the place of the friction; what the recordings do not determine is unchanged.
     pub(super) fn push_transmission(&self, put: &mut ValueSink<'_>) {
         let Some(fit) = &self.transmission else { return };
         let Some(masses) = &fit.masses else { return };
@@ -44,6 +44,11 @@ impl Identification {
                 width,
                 error,
             );
+        }
+        // An axis with presliding has all of its friction at the motor.
+        let share = masses.load_friction.filter(|_| self.axis.presliding.is_none());
+        if let (Some(value), Some(share)) = (masses.load_friction_share(), share) {
+            put(&["transmission.load_friction"], value, Some(share.error()), None, source());
         }
     }
 }
