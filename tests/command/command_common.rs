@@ -33,3 +33,10 @@ pub fn assert_rejected(arguments: &[&str], parts: &[&str]) {
         assert!(message.contains(part), "{part:?} in {message}");
     }
 }
+
+/// Checks that a number is within a part of the expected one.
+#[track_caller]
+pub fn assert_near(found: &Value, expected: f64, part: f64) {
+    let found = found.as_f64().expect("a number");
+    assert!((found / expected - 1.0).abs() <= part, "{found}, not {expected}");
+}

@@ -4,7 +4,7 @@ use std::process::{Command, Stdio};
 use std::sync::LazyLock;
 use std::time::Duration;
 
-use crate::command_common::{assert_rejected, json, printed};
+use crate::command_common::{assert_near, assert_rejected, json, printed};
 use serde_json::Value;
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
@@ -52,12 +52,6 @@ const OTHER: [&str; 8] = [
     "--set",
     "x.delays.beta_ms=15",
 ];
-
-#[track_caller]
-fn assert_near(found: &Value, expected: f64, part: f64) {
-    let found = found.as_f64().expect("a number");
-    assert!((found / expected - 1.0).abs() <= part, "{found}, not {expected}");
-}
 
 /// Returns the friction current of X at `v` m/min (model.md, table of axes), A.
 fn friction(a: f64, b: f64, c: f64, d: f64, v: f64) -> f64 {
@@ -213,75 +207,6 @@ fn recordings_without_information_on_the_axis_are_rejected() {
         &["no parameter of y could be identified\n", "missing: no friction law", "; record "],
     );
     assert!(folder.names().is_empty());
-}
-
-/// Sets a transmission of 150 N/µm and 1300 kg on X.
-const ELASTIC: [&str; 8] = [
-    "--set",
-    "x.transmission.stiffness_n_um=150",
-    "--set",
-    "x.transmission.load_mass_kg=1300",
-    "--set",
-    "x.transmission.damping_n_s_m=15000",
-    "--set",
-    "x.transmission.backlash_um=9",
-];
-
-/// Returns setpoints of X: a steady motion to and fro with a chirp from 2 to 60 Hz.
-fn chirp() -> String {
-    let (mut position, mut text) = (0.0, "time,x\n".to_owned());
-    for k in 0..1500 {
-        let t = f64::from(k) * 0.006 - 0.5;
-        if (0.0..8.0).contains(&t) {
-            let phase = std::f64::consts::TAU * 16.0 / 30_f64.ln() * (30_f64.powf(t / 8.0) - 1.0);
-            let steady = (10.0 * (std::f64::consts::PI * t).sin()).clamp(-1.0, 1.0);
-            position += 0.006 * (t / 0.2).min(1.0) * (0.025 * steady + 0.018 * phase.sin());
-        }
-        text.push_str(&format!("{:.3},{position:.9}\n", f64::from(k) * 0.006));
-    }
-    text
-}
-
-#[test]
-fn both_encoders_identify_the_transmission_of_a_trace() {
-    let folder = TestFolder::new("identify_transmission");
-    let path = |name: &str| folder.0.join(name).to_string_lossy().into_owned();
-    let psec = folder.file("chirp.csv", chirp()).to_string_lossy().into_owned();
-    let of = |trace: &str| -> Value {
-        let run = ["run", &psec, "--quiet", "--trace", trace, "--trace-period", "500us"];
-        printed(&[run.as_slice(), &ELASTIC].concat());
-        let out = path("out.yaml");
-        let page = path("page.html");
-        let output = ["--axis", "x", "--json", "--out", &out, "--report", &page];
-        let found = json(&[&["identify", "--transmission", trace], output.as_slice()].concat());
-        let page = std::fs::read_to_string(&page).expect("a page");
-        assert!(page.contains("antiresonance") && page.contains("inertia of the load"));
-        // The machine file is valid.
-        printed(&["run", "ballbar", "--machine", &out, "--quiet"]);
-        found
-    };
-    for trace in ["both.csv", "both.mcap"] {
-        let found = of(&path(trace));
-        let values = found["values"].as_array().expect("a list");
-        let value = |key: &str| {
-            let key = format!("x.transmission.{key}");
-            values.iter().find(|value| value["key"] == key.as_str()).expect("a value")["value"].clone()
-        };
-        assert_near(&value("stiffness_n_um"), 150.0, 0.03);
-        assert_near(&value("load_mass_kg"), 1300.0, 0.03);
-        assert_near(&value("backlash_um"), 9.0, 0.1);
-        // √(150e6 / 1300) / 2π.
-        assert_near(&found["transmission"]["antiresonance_hz"]["value"], 54.063, 2e-3);
-        assert_eq!(found["transmission_recordings"].as_array().map(Vec::len), Some(1));
-    }
-    // Without the wind-up there is one encoder.
-    let text =
-        std::fs::read_to_string(path("both.csv")).expect("a trace").replacen("x.wind_up", "x.other", 1);
-    let one = folder.file("one.csv", &text).to_string_lossy().into_owned();
-    assert_rejected(
-        &["identify", "--transmission", &one, "--axis", "x"],
-        &["one.csv: no position of the motor", "one encoder does not tell", "motor_position"],
-    );
 }
 
 #[test]

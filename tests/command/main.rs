@@ -9,6 +9,7 @@ mod examples;
 mod files_output;
 mod hints;
 mod identify_command;
+mod identify_elastic;
 mod identify_traces;
 mod ingress_properties;
 mod interface;

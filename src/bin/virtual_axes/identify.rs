@@ -11,7 +11,7 @@ use virtual_axes_identify::identify::{
     IdentificationOptions, IdentifiedValue, RefinementScope,
 };
 use virtual_axes_identify::recording::{Finding, Severity};
-use virtual_axes_io::files::OutputFile;
+use virtual_axes_io::files::{OutputFile, read_recording};
 use virtual_axes_report::{IdentificationPage, ValidationRecording};
 
 use crate::campaign::FeedforwardName;
@@ -21,7 +21,7 @@ use crate::input::must_not_replace;
 use crate::output_arguments::{OutputArguments, OutputFormat};
 use crate::progress::Spinner;
 use crate::recordings::{self, RecordingArguments};
-use crate::{axis, identify_text, machine_file, report, variant};
+use crate::{axis, identify_text, machine_file, report, text_table, variant};
 
 /// Group of parameters that the refinement adjusts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -121,13 +121,15 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     let parameters = variant::parameters(&machine, None, &arguments.set, &[])?;
     let config = variant::checked(&parameters, &machine, &arguments.machine)?;
     let Some(name) = &arguments.axis else {
-        return columns::listing(&arguments.listed(), &arguments.reading, &config, &arguments.machine);
+        let recordings = (arguments.recordings.as_slice(), arguments.transmission.as_slice());
+        return columns::listing(recordings, &arguments.reading, &config, &arguments.machine);
     };
     let is_all = name == ALL;
-    let indices = if is_all {
-        columns::recorded_axes(&arguments.listed(), &arguments.reading, &config)?
+    let (indices, resting) = if is_all {
+        let recorded = columns::recorded_axes(&arguments.listed(), &arguments.reading, &config)?;
+        moving_axes(arguments, &config, recorded)?
     } else {
-        vec![axis::index(&config, name)?]
+        (vec![axis::index(&config, name)?], Vec::new())
     };
     if let (Some(page), true) = (&arguments.report, is_all) {
         return Err(
@@ -162,11 +164,42 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
         machine_file::write(out, &machine_text(arguments, &summaries, &present))?;
     }
     drop(spinner);
+    if !resting.is_empty() && arguments.output.format() == OutputFormat::Text {
+        texts.push(text_table::wrapped_line(&format!("at rest, not identified: {}", resting.join(", "))));
+    }
     joined(arguments, &summaries, &texts)
 }
 
 /// Value of `--axis` for all recorded axes.
 const ALL: &str = "all";
+/// Range of the setpoint, or else of the position, of an axis at rest, m or rad.
+const AT_REST: f64 = 2e-5;
+
+/// Returns the axes that move in one of the recordings, and the names of the others.
+fn moving_axes(
+    arguments: &IdentifyArguments,
+    config: &MachineConfig,
+    axes: Vec<usize>,
+) -> Result<(Vec<usize>, Vec<String>), Box<dyn Error>> {
+    let options = arguments.reading.options()?;
+    let moves = |index: &usize| {
+        let axis = &config.axes()[*index];
+        arguments.listed().iter().any(|path| {
+            // The identification reports a recording that cannot be read.
+            let Ok((raw, _)) = read_recording(path, axis, &options) else { return true };
+            let signal = raw.psec.or(raw.position).unwrap_or_default();
+            let range = |bounds: (f64, f64), x: &f64| (bounds.0.min(*x), bounds.1.max(*x));
+            let (least, most) = signal.iter().fold((f64::INFINITY, f64::NEG_INFINITY), range);
+            most - least > AT_REST
+        })
+    };
+    let (moving, resting): (Vec<usize>, Vec<usize>) = axes.into_iter().partition(moves);
+    let names: Vec<String> = resting.iter().map(|index| config.axes()[*index].name().to_owned()).collect();
+    if moving.is_empty() {
+        return Err(format!("--axis all: no axis moves in the recordings ({})", names.join(", ")).into());
+    }
+    Ok((moving, names))
+}
 
 /// Returns the output for one axis, without JSON.
 fn output(arguments: &IdentifyArguments, summary: &IdentificationSummary) -> String {

@@ -11,9 +11,10 @@ use virtual_axes_report::{Table, TableColumn};
 use crate::recordings::RecordingArguments;
 use crate::text_table;
 
-/// Returns the columns of the recordings, what they are taken for, what is missing, and the next command.
+/// Returns the columns of the recordings, what they are taken for, what is missing, and the next command; those of
+/// `transmission` have both encoders.
 pub fn listing(
-    recordings: &[PathBuf],
+    (recordings, transmission): (&[PathBuf], &[PathBuf]),
     reading: &RecordingArguments,
     config: &MachineConfig,
     machine: &str,
@@ -21,12 +22,13 @@ pub fn listing(
     let options = reading.options()?;
     let mut text = String::new();
     let mut axes: Vec<usize> = Vec::new();
-    for path in recordings {
+    for path in recordings.iter().chain(transmission) {
         let found = inspect_recording(path, &options)?;
         text += &format!("{}: {}\n\n", escaped(&path.display().to_string()), found.format);
         text += &text_table::aligned(&table(&found), &[0, 1, 2, 3, 4]);
         text.push('\n');
-        for line in missing(&found) {
+        let needed = if transmission.contains(path) { &BOTH_ENCODERS[..] } else { &ONE_ENCODER[..] };
+        for line in missing(&found, needed) {
             text += &text_table::wrapped_line(&line);
         }
         axes.extend(axes_of(&found, config));
@@ -38,7 +40,9 @@ pub fn listing(
     let assumed = "assumed without other information: all values of the machine file, recordings without cutting, and the \
                    feedforward that the lag of the position shows";
     text += &text_table::wrapped_line(assumed);
-    let files: Vec<String> = recordings.iter().map(|path| path.display().to_string()).collect();
+    let files = recordings.iter().map(|path| path.display().to_string());
+    let files = files.chain(transmission.iter().map(|path| format!("--transmission {}", path.display())));
+    let files: Vec<String> = files.collect();
     let name = match names.as_slice() {
         [] => "NAME".to_owned(),
         [one] => (*one).to_owned(),
@@ -115,8 +119,29 @@ fn axes_of(found: &RecordingColumns, config: &MachineConfig) -> Vec<usize> {
         .collect()
 }
 
+/// Channels, each with its name and the effect of its absence; one of the channels is enough.
+type NeededChannel = (&'static [Channel], &'static str, &'static str);
+
+const POSITION: NeededChannel = (&[Channel::Position], "actual position", "without it nothing is identified");
+/// Channels of a recording with one encoder.
+const ONE_ENCODER: [NeededChannel; 3] = [
+    POSITION,
+    (&[Channel::Psec], "commanded position", "without it there are no delays, gains and feedforward weights"),
+    (&[Channel::Current], "motor current", "without it there are no friction, gravity and inertia"),
+];
+/// Channels of a recording with both encoders.
+const BOTH_ENCODERS: [NeededChannel; 3] = [
+    POSITION,
+    (
+        &[Channel::MotorPosition, Channel::WindUp],
+        "position of the motor",
+        "without it there is no transmission",
+    ),
+    (&[Channel::Current], "motor current", "without it there are only antiresonance and backlash"),
+];
+
 /// Returns what a recording lacks, one line each.
-fn missing(found: &RecordingColumns) -> Vec<String> {
+fn missing(found: &RecordingColumns, needed: &[NeededChannel]) -> Vec<String> {
     let has = |channel: Channel| found.columns.iter().any(|column| column.channel == Some(channel));
     let mut lines = Vec::new();
     if found.format == RecordingFormat::Mcap {
@@ -125,16 +150,8 @@ fn missing(found: &RecordingColumns) -> Vec<String> {
     if !found.has_time() {
         lines.push("missing: time; give the sampling rate with --rate-hz".to_owned());
     }
-    for (channel, name, effect) in [
-        (Channel::Position, "actual position", "without it nothing is identified"),
-        (
-            Channel::Psec,
-            "commanded position",
-            "without it there are no delays, gains and feedforward weights",
-        ),
-        (Channel::Current, "motor current", "without it there are no friction, gravity and inertia"),
-    ] {
-        if !has(channel) {
+    for (channels, name, effect) in needed {
+        if !channels.iter().any(|channel| has(*channel)) {
             lines.push(format!("missing: {name}; {effect}; name its column with --column"));
         }
     }

@@ -148,6 +148,9 @@ fn headers_name_channel_unit_and_axis() {
         ("v [mm/s]", "velocity [mm/s]"),
         ("v_act_m_min", "velocity [m/min]"),
         ("Encoder 2 position [mm]", "position [mm]"),
+        ("x.wind_up", "wind_up [m or rad (assumed)] x"),
+        ("Wind-up [um]", "wind_up [um]"),
+        ("motor position setpoint [mm]", "psec [mm]"),
         // No channels.
         ("following error [mm]", "-"),
         ("Schleppfehler X [mm]", "- x"),
@@ -168,6 +171,22 @@ fn headers_name_channel_unit_and_axis() {
         .map(|(header, wanted)| format!("{header}: {} for {wanted}", detected(header)))
         .collect();
     assert_eq!(wrong, [""; 0]);
+}
+
+#[test]
+fn the_position_of_a_motor_is_that_of_its_axis_without_another_one() {
+    let channels = |header: &str| -> Vec<String> {
+        let recorded = Recorded::new("a.csv", &format!("{header}\n0,0,0,0\n"));
+        recorded
+            .inspect()
+            .columns
+            .iter()
+            .map(|column| column.channel.map_or("-", Channel::name).to_owned())
+            .collect()
+    };
+    let header = "time,motor position x [mm],position x [mm],motor position y [mm]";
+    assert_eq!(channels(header), ["time", "motor_position", "position", "position"]);
+    assert_eq!(channels("time,Motor Lage [mm],wind_up,current"), ["time", "position", "wind_up", "current"]);
 }
 
 #[test]

@@ -10,6 +10,17 @@ const MAX_HEADER: usize = 300;
 /// Maximum number of characters of an unknown unit.
 const MAX_UNIT: usize = 8;
 
+/// Takes the position of a motor for that of its axis if the columns have no other one.
+pub(super) fn resolve_motor_positions(columns: &mut [FoundColumn]) {
+    let positions = columns.iter().filter(|column| column.channel == Some(Channel::Position));
+    let axes: Vec<Option<String>> = positions.map(|column| column.axis.clone()).collect();
+    for column in columns {
+        if column.channel == Some(Channel::MotorPosition) && !axes.contains(&column.axis) {
+            column.channel = Some(Channel::Position);
+        }
+    }
+}
+
 /// Unit in a header.
 #[derive(Debug, Clone, PartialEq)]
 enum HeaderUnit {
@@ -273,7 +284,9 @@ impl Facts {
             }
             HeaderQuantity::Position if self.is_setpoint => Ok(Channel::Psec),
             _ if self.is_setpoint => Err(format!("{}: a setpoint, not an actual value", self.quoted())),
+            HeaderQuantity::Position if self.is_motor => Ok(Channel::MotorPosition),
             HeaderQuantity::Position => Ok(Channel::Position),
+            HeaderQuantity::WindUp => Ok(Channel::WindUp),
             HeaderQuantity::Velocity if self.is_motor => {
                 Err(format!("{}: the speed of the motor, not of the axis", self.quoted()))
             }

@@ -175,5 +175,6 @@ pub(super) fn detect_columns(headers: &[String]) -> Vec<FoundColumn> {
     };
     let mut columns: Vec<FoundColumn> = headers.iter().zip(1..).map(detect).collect();
     header::resolve_axis_a(&mut columns);
+    header::resolve_motor_positions(&mut columns);
     columns
 }

@@ -10,6 +10,8 @@ pub(super) enum HeaderQuantity {
     Velocity,
     Current,
     Torque,
+    /// Position of the motor minus that of the load.
+    WindUp,
     Time,
     /// Number of a sample or cycle.
     Counter,
@@ -35,7 +37,7 @@ pub(super) enum WordMeaning {
     Other(&'static str),
 }
 
-use HeaderQuantity::{Counter, Current, Position, Time, Torque, Velocity};
+use HeaderQuantity::{Counter, Current, Position, Time, Torque, Velocity, WindUp};
 use WordMeaning::{Actual, Feedforward, Filler, Motor, Other, Psec, Setpoint, Tffws, Vffws};
 
 /// Words by meaning.
@@ -44,6 +46,8 @@ const WORDS: &[(WordMeaning, &[&str])] = &[
     (WordMeaning::Quantity(Velocity), &["velocity", "vel", "velo", "speed", "geschwindigkeit", "drehzahl"]),
     (WordMeaning::Quantity(Current), &["current", "curr", "strom", "iq"]),
     (WordMeaning::Quantity(Torque), &["torque", "trq", "moment", "drehmoment", "force", "kraft"]),
+    // The first word of "wind_up" and "wind-up".
+    (WordMeaning::Quantity(WindUp), &["wind", "windup"]),
     (WordMeaning::Quantity(Time), &["time", "zeit", "timestamp", "zeitstempel"]),
     (WordMeaning::Quantity(Counter), &["sample", "samples", "cycle", "cycles"]),
     (
