@@ -242,7 +242,7 @@ const QUANTITIES: [Quantity; 6] = [
     (LOAD_FRICTION, |t| t.load_friction, |f| f.masses.as_ref().and_then(|m| m.load_friction)),
 ];
 /// Quantity that can be 0: its error is not relative to its value.
-const LOAD_FRICTION: &str = "share of the friction at the load";
+const LOAD_FRICTION: &str = "friction at the load";
 
 /// Returns the error of a value of a quantity, %.
 fn error(name: &str, value: f64, truth: f64) -> f64 {
