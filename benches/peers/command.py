@@ -16,12 +16,13 @@ import argparse
 import csv
 import math
 import os
+import re
 import statistics
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -58,8 +59,10 @@ class Command:
     """Arguments; `{folder}` is the folder with the inputs."""
     setpoints: str
     """Name of a CSV file in the folder."""
-    runs: int = 1
+    runs: float = 1
     """Simulations of these setpoints that the command makes at least."""
+    program: Path | None = None
+    """Another program than the command; it prints the time that it simulates."""
 
 
 @dataclass
@@ -109,6 +112,9 @@ moves:
 """
 """The ballbar test with 150 turns."""
 
+STRESS = ROOT / "target/release/virtual_axes_stress"
+"""Random trajectories with a check of every tick: `cargo build --release -p virtual_axes_verification`."""
+
 COMMANDS = (
     Command("setpoints", ("run", "{folder}/path.csv"), "path.csv"),
     Command("ballbar", ("run", "ballbar"), "ballbar.csv"),
@@ -127,6 +133,7 @@ COMMANDS = (
     # The number of simulations that `tune` prints, and the plants of `robustness`.
     Command("tune", ("tune", "ballbar", "--controller", "gpc"), "ballbar.csv", 1090),
     Command("robustness", ("robustness", "ballbar"), "ballbar.csv", 15),
+    Command("stress", ("--count", "2000", "--threads", "1"), "path.csv", program=STRESS),
     Command("identify", ("identify", "{folder}/recording.csv", "--axis", "x"), "campaign.csv"),
 )
 """Commands by name; the first column of docs/internals/performance.md."""
@@ -161,6 +168,17 @@ def c_loop(folder: Path, name: str, program: str) -> Contender:
     text = folder / (Path(name).stem + ".txt")
     text.write_text("\n".join(" ".join(row) for row in rows) + "\n")
     return Contender(name, [program, str(TABLE), str(text)])
+
+
+def of_program(command: Command, setpoints: float) -> Command:
+    """Returns a command whose runs of `setpoints` (s) are those of the time that its program simulates."""
+    if command.program is None:
+        return command
+    done = subprocess.run([command.program, *command.words], check=True, capture_output=True, text=True)
+    found = re.search(r"^simulated time: ([\d.]+) s", done.stdout, re.MULTILINE)
+    if found is None:
+        sys.exit(f"{command.program.name}: prints no simulated time")
+    return replace(command, runs=float(found[1]) / setpoints)
 
 
 def rows_of(folder: Path, name: str) -> int:
@@ -242,17 +260,23 @@ def main() -> int:
         folder = Path(name)
         write_inputs(folder, arguments.program)
         wanted = [command for command in COMMANDS if command.name in (arguments.case or names)]
+        for missing in [command for command in wanted if command.program and not command.program.exists()]:
+            print(f"{missing.name}: not measured, {missing.program} is not built", file=sys.stderr)
+            wanted.remove(missing)
         compiled, usage = build("scalar.c", folder), build("usage.c", folder)
         for command in wanted:
+            seconds = rows_of(folder, command.setpoints) * POSITION_PERIOD
+            command, contenders = of_program(command, seconds), programs
+            if command.program is not None:
+                contenders = {"now": str(command.program)}
             loop = c_loop(folder, command.setpoints, compiled)
             loop.start()
             try:
-                found = measure(command, folder, programs, loop, usage, arguments.rounds, arguments.cpu)
+                found = measure(command, folder, contenders, loop, usage, arguments.rounds, arguments.cpu)
             finally:
                 loop.end()
-            simulated = rows_of(folder, command.setpoints) * POSITION_PERIOD * command.runs
-            for program in programs:
-                print(row_of(command, program, found, simulated), flush=True)
+            for program in contenders:
+                print(row_of(command, program, found, seconds * command.runs), flush=True)
     return 0
 
 
