@@ -11,7 +11,7 @@ use virtual_axes_core::path::Program;
 use virtual_axes_core::scenario::{Scenario, is_file_name, nearest_input};
 use virtual_axes_core::text::{escaped, nearest_hint};
 use virtual_axes_core::trial::{self, Measures, SetpointSource, Tick, Trial};
-use virtual_axes_io::files::{self, FileKind};
+use virtual_axes_io::files::FileKind;
 use virtual_axes_nc::builtin::BuiltinProgram;
 
 use crate::input::CommandInput;
@@ -47,7 +47,7 @@ pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
         return part_program(arguments, &name, &config);
     }
     let is_machine = match arguments.file.exists() {
-        true => files::Input::open(&arguments.file)?.kind() == FileKind::Machine,
+        true => part_program::open_other(&arguments.file)?.kind() == FileKind::Machine,
         false => is_shipped_machine(&name)?,
     };
     let no_audit = || format!("{name}: --json requires setpoints or a part program");

@@ -7,7 +7,7 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::part_program::{count_lines, is_part_program};
+use crate::part_program::{count_lines, is_part_program, open_other};
 use crate::part_program_arguments::PartProgramArguments;
 use crate::part_program_source::{PartProgramOptions, PartProgramSource, ProgramTrack};
 use crate::print_error;
@@ -65,7 +65,7 @@ impl CommandInput {
         } else if is_part_program(name) {
             Content::PartProgram
         } else {
-            content_of(files::Input::open(Path::new(name))?, topic)?
+            content_of(open_other(Path::new(name))?, topic)?
         };
         if topic.is_some() && !matches!(content, Content::Mcap { .. }) {
             return Err(format!("{name}: --topic requires an MCAP recording").into());

@@ -8,6 +8,7 @@ use std::path::Path;
 use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_core::text::escaped;
 use virtual_axes_core::units::{MILLIMETER, Rounded, position_text};
+use virtual_axes_io::files::{self, InputError};
 use virtual_axes_nc::builtin::{BuiltinProgram, open_program};
 use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions, TipTransform};
 use virtual_axes_nc::motion::{Coordinates, Feed, MotionKind, ProgramEvent, ProgramMotion, ProgramStep};
@@ -28,6 +29,17 @@ pub fn is_part_program(name: &str) -> bool {
     let extension = Path::new(name).extension().and_then(|extension| extension.to_str());
     let is_known = |extension: &str| EXTENSIONS.iter().any(|known| extension.eq_ignore_ascii_case(known));
     BuiltinProgram::find(name).is_some() || extension.is_some_and(is_known)
+}
+
+/// Opens a file that is no part program and detects its kind; the error of an unknown one names the extensions of part
+/// programs.
+pub fn open_other(path: &Path) -> Result<files::Input, String> {
+    files::Input::open(path).map_err(|error| match error {
+        InputError::Unknown { .. } | InputError::Syntax { is_first_line: true, .. } => {
+            format!("{error}; part programs have the extension {}", EXTENSIONS.join(", "))
+        }
+        InputError::Unreadable { .. } | InputError::Syntax { .. } => error.to_string(),
+    })
 }
 
 /// Returns the number of lines of a part program.
