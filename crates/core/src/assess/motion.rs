@@ -98,7 +98,7 @@ impl MotionAssessor {
         } else {
             self.contour.nearest_one_by_one(&self.positions, &mut self.feet);
         }
-        for square in &self.feet.square_distance {
+        for square in self.feet.square_distance.iter() {
             let distance = square.sqrt();
             self.max_contour = self.max_contour.max(distance);
             self.sum_contour_squared += distance * distance;

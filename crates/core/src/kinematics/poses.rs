@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::chain::{AxisRole, Kinematics, TableAngles, Tables, ToolPose};
-use crate::simd::{SliceOperation, vectorize};
+use crate::simd::{AlignedBuffer, LANES, SliceOperation, vectorize};
 
 /// Largest distance of an angle from the middle one, rad, up to which sines and cosines are computed by power series.
 const SERIES_LIMIT: f64 = 0.0625;
@@ -12,13 +12,13 @@ const SERIES_LIMIT: f64 = 0.0625;
 #[derive(Debug, Clone, Default)]
 pub struct Poses {
     /// X, Y and Z of the tips, m, workpiece frame.
-    tips: [Vec<f64>; 3],
+    tips: [AlignedBuffer; 3],
     /// Components of the tool axes.
-    axes: [Vec<f64>; 3],
+    axes: [AlignedBuffer; 3],
     /// True if the tables do not move.
     has_constant_axis: bool,
     /// Sines and cosines of A and C at each instant.
-    angles: [[Vec<f64>; 2]; 2],
+    angles: [[AlignedBuffer; 2]; 2],
 }
 
 /// Returns true if all values are bit-identical.
@@ -39,12 +39,12 @@ impl Poses {
 
     /// Returns X, Y and Z of the tips, m, workpiece frame.
     pub fn tips(&self) -> [&[f64]; 3] {
-        self.tips.each_ref().map(Vec::as_slice)
+        self.tips.each_ref().map(|values| &**values)
     }
 
     /// Returns the components of the tool axes in the workpiece frame.
     pub fn axes(&self) -> [&[f64]; 3] {
-        self.axes.each_ref().map(Vec::as_slice)
+        self.axes.each_ref().map(|values| &**values)
     }
 
     /// Returns the tip at `instant`, m, workpiece frame.
@@ -79,7 +79,7 @@ impl Poses {
     fn resize(&mut self, instants: usize) {
         let angles = self.angles.iter_mut().flatten();
         for values in self.tips.iter_mut().chain(&mut self.axes).chain(angles) {
-            values.resize(instants, 0.0);
+            values.resize(instants);
         }
     }
 }
@@ -134,13 +134,13 @@ fn write_sines(
     values: Option<&[f64]>,
     middle: f64,
     sin_cos: (f64, f64),
-    [sines, cosines]: &mut [Vec<f64>; 2],
+    [sines, cosines]: &mut [AlignedBuffer; 2],
 ) {
     let is_series = values.is_some_and(|values| {
         vectorize(SineSeries { values, middle, sin_cos, sines: &mut *sines, cosines: &mut *cosines })
     });
     if !is_series {
-        for (index, (sine, cosine)) in sines.iter_mut().zip(cosines).enumerate() {
+        for (index, (sine, cosine)) in sines.iter_mut().zip(cosines.iter_mut()).enumerate() {
             (*sine, *cosine) = values.map_or(sin_cos, |values| values[index].sin_cos());
         }
     }
@@ -220,17 +220,24 @@ impl SliceOperation for MovingTables<'_> {
     #[inline(always)]
     fn run(self) {
         let MovingTables { center, poses } = self;
-        let count = poses.len();
-        let [xs, ys, zs] = poses.tips.each_mut().map(|values| &mut values[..count]);
-        let [us, vs, ws] = poses.axes.each_mut().map(|values| &mut values[..count]);
+        let count = poses.len().div_ceil(LANES);
+        let [xs, ys, zs] = poses.tips.each_mut().map(|values| &mut values.lanes_mut()[..count]);
+        let [us, vs, ws] = poses.axes.each_mut().map(|values| &mut values.lanes_mut()[..count]);
         let [[sin_a, cos_a], [sin_c, cos_c]] =
-            poses.angles.each_ref().map(|pair| pair.each_ref().map(|values| &values[..count]));
-        for index in 0..count {
-            let tables = center.with_sin_cos((sin_a[index], cos_a[index]), (sin_c[index], cos_c[index]));
-            let tip = tables.tip(Vector3::new(xs[index], ys[index], zs[index]));
-            (xs[index], ys[index], zs[index]) = (tip.x, tip.y, tip.z);
-            let axis = tables.tool_axis();
-            (us[index], vs[index], ws[index]) = (axis.x, axis.y, axis.z);
+            poses.angles.each_ref().map(|pair| pair.each_ref().map(|values| &values.lanes()[..count]));
+        for part in 0..count {
+            let (x, y, z) = (xs[part], ys[part], zs[part]);
+            let (sin_a, cos_a, sin_c, cos_c) = (sin_a[part], cos_a[part], sin_c[part], cos_c[part]);
+            let (mut tips, mut axes) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+            for k in 0..LANES {
+                let tables = center.with_sin_cos((sin_a[k], cos_a[k]), (sin_c[k], cos_c[k]));
+                let tip = tables.tip(Vector3::new(x[k], y[k], z[k]));
+                (tips[0][k], tips[1][k], tips[2][k]) = (tip.x, tip.y, tip.z);
+                let axis = tables.tool_axis();
+                (axes[0][k], axes[1][k], axes[2][k]) = (axis.x, axis.y, axis.z);
+            }
+            [xs[part], ys[part], zs[part]] = tips;
+            [us[part], vs[part], ws[part]] = axes;
         }
     }
 }

@@ -18,7 +18,9 @@ use crate::units::seconds;
 use super::compensation::FrictionCompensation;
 use super::controller::{create_position_controller, feedforward_config};
 use super::coupling::CouplingTorques;
-use super::inner_loops::{InnerLoopInputs, InnerLoopState, InnerLoops, TickRecord, ZeroOrderHold};
+use super::inner_loops::{
+    DriveFeedback, InnerLoopInputs, InnerLoopState, InnerLoops, TickRecord, ZeroOrderHold,
+};
 use super::{AxisError, AxisSample};
 
 /// Immutable parameters of one axis: plant, controllers and delays.
@@ -42,8 +44,8 @@ pub struct AxisParameters {
     /// Weight of the wind-up in the angle that the position controller reads: 1 with an encoder at the load, else 0.
     wind_up_feedback: f64,
     position_delay: TickDelay,
-    velocity_delay: TickDelay,
-    torque_delay: TickDelay,
+    velocity_delay: FeedforwardDelay,
+    torque_delay: FeedforwardDelay,
     transmission_ratio: f64,
     inverse_ratio: f64,
     /// Kt that the drive assumes, without the deviation of the plant, N·m/A.
@@ -53,6 +55,28 @@ pub struct AxisParameters {
     max_speed: f64,
     ticks_per_position: u64,
     ticks_per_velocity: u64,
+}
+
+/// Delay of a feedforward.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct FeedforwardDelay {
+    delay: TickDelay,
+    /// Velocity cycle of a position cycle from which on the feedforward of the next setpoint is in effect.
+    switch: f64,
+}
+
+impl FeedforwardDelay {
+    /// Creates a delay of `ticks`.
+    fn new(ticks: u64, periods: &Periods) -> Self {
+        let delay = TickDelay::new(ticks, periods.ticks_per_position());
+        FeedforwardDelay { delay, switch: delay.switch_tick().div_ceil(periods.ticks_per_velocity()) as f64 }
+    }
+
+    /// Returns the feedforward over position cycle `k`; `value` returns that of a setpoint.
+    fn hold(&self, k: i64, value: impl Fn(i64) -> f64) -> ZeroOrderHold {
+        let after = self.delay.index_after_switch(k);
+        ZeroOrderHold { before: value(after - 1), after: value(after), step: self.switch }
+    }
 }
 
 impl AxisParameters {
@@ -67,7 +91,7 @@ impl AxisParameters {
     }
 
     fn setpoint_window(&self) -> SetpointWindow {
-        let delay = self.delays.position.div_ceil(self.ticks_per_position) as i64;
+        let delay = -self.position_delay.index_at_cycle_start(0);
         let compensation = self.compensation.as_ref().map_or(0, FrictionCompensation::preview);
         SetpointWindow {
             delay: self.delays.longest(),
@@ -120,8 +144,8 @@ impl AxisParameters {
             has_contour_control: false,
             is_coupled: false,
             position_delay: TickDelay::new(delays.position, ticks),
-            velocity_delay: TickDelay::new(delays.velocity, ticks),
-            torque_delay: TickDelay::new(delays.torque, ticks),
+            velocity_delay: FeedforwardDelay::new(delays.velocity, periods),
+            torque_delay: FeedforwardDelay::new(delays.torque, periods),
             delays,
             wind_up_feedback: f64::from(u8::from(axis.position_loop.feedback == PositionFeedback::Load)),
             transmission_ratio: axis.transmission_ratio,
@@ -133,11 +157,6 @@ impl AxisParameters {
             ticks_per_position: ticks,
             ticks_per_velocity: periods.ticks_per_velocity(),
         })
-    }
-
-    /// Returns a feedforward over one position cycle, from its values before and after the delayed setpoint switches.
-    fn zero_order_hold(&self, delay: TickDelay, before: f64, after: f64) -> ZeroOrderHold {
-        ZeroOrderHold { before, after, step: delay.switch_tick().div_ceil(self.ticks_per_velocity) as f64 }
     }
 }
 
@@ -226,7 +245,8 @@ impl Axis {
     ) {
         // TFFWS at the last tick of the position cycle.
         let torque = |p: &AxisParameters| {
-            p.feedforward.torque(&self.psec, p.torque_delay.index_after_switch(self.psec.present_index()))
+            p.feedforward
+                .torque(&self.psec, p.torque_delay.delay.index_after_switch(self.psec.present_index()))
         };
         let limit = p.torque_constant * p.max_current;
         state.velocity.integral += (torque(old) - torque(p)).clamp(-limit, limit);
@@ -286,15 +306,15 @@ impl Axis {
     }
 
     /// Returns the position that the position controller reads, m or rad.
-    pub(super) fn measured_position(&self, p: &AxisParameters, state: &InnerLoopState) -> f64 {
-        p.loops.plant.position(self.measured_angle(p, state))
+    pub(super) fn measured_position(&self, p: &AxisParameters, feedback: &DriveFeedback) -> f64 {
+        p.loops.plant.position(self.measured_angle(p, feedback))
     }
 
     /// Returns the angle that the position controller reads, rad of the motor.
-    fn measured_angle(&self, p: &AxisParameters, state: &InnerLoopState) -> f64 {
+    fn measured_angle(&self, p: &AxisParameters, feedback: &DriveFeedback) -> f64 {
         // A scale at the load does not see the motion of the structure.
-        let wind_up = p.wind_up_feedback * (state.load.wind_up + state.contact.structure);
-        state.motor.angle - wind_up - self.backlash_offset.angle()
+        let wind_up = p.wind_up_feedback * feedback.wind_up;
+        feedback.angle - wind_up - self.backlash_offset.angle()
     }
 
     /// Sets the velocity that cross-coupled control adds in the present position cycle, m/s.
@@ -311,27 +331,23 @@ impl Axis {
     pub(super) fn execute_position_loop(
         &mut self,
         p: &AxisParameters,
-        state: &InnerLoopState,
+        feedback: &DriveFeedback,
     ) -> InnerLoopInputs {
         let present = self.psec.present_index();
-        let (history, motor) = (&self.psec, &state.motor);
+        let history = &self.psec;
         let k = p.position_delay.index_at_cycle_start(present);
         self.sample.psec = history.at(present);
         self.sample.delayed_psec = history.at(k);
-        if state.max_current_excess > 0.0 {
-            self.position.record_saturated(motor.speed);
+        if feedback.max_current_excess > 0.0 {
+            self.position.record_saturated(feedback.speed);
         }
-        let hold = |delay: TickDelay, value: &dyn Fn(i64) -> f64| {
-            let after = delay.index_after_switch(present);
-            p.zero_order_hold(delay, value(after - 1), value(after))
-        };
-        let velocity = hold(p.velocity_delay, &|k| p.feedforward.velocity(history, k));
-        let torque = hold(p.torque_delay, &|k| p.feedforward.torque(history, k));
-        let feedforward = velocity.at(0.0);
+        let velocity = p.velocity_delay.hold(present, |k| p.feedforward.velocity(history, k));
+        let torque = p.torque_delay.hold(present, |k| p.feedforward.torque(history, k));
+        let velocity_feedforward = velocity.at(0.0);
         let setpoint = |j| history.at(k + j) * p.inverse_ratio;
         self.backlash_offset.update(&p.backlash_compensation, setpoint(0) - setpoint(-1));
-        let angle = self.measured_angle(p, state);
-        let mut unlimited = p.position.update(&mut self.position, setpoint, angle, feedforward);
+        let angle = self.measured_angle(p, feedback);
+        let mut unlimited = p.position.update(&mut self.position, setpoint, angle, velocity_feedforward);
         let offset = self.velocity_offset + std::mem::take(&mut self.contour_offset);
         // Adding 0 would change the sign of -0.
         if offset != 0.0 {
@@ -340,7 +356,7 @@ impl Axis {
         // An unstable RST controller (allow_unstable) can overflow: the axis stops then.
         let finite = if unlimited.is_finite() { unlimited } else { 0.0 };
         let velocity_setpoint = finite.clamp(-p.max_speed, p.max_speed);
-        self.position.record(velocity_setpoint + feedforward);
+        self.position.record(velocity_setpoint + velocity_feedforward);
         self.previous_load = self.inputs.load;
         self.coupling_torques.begin_cycle();
         self.inputs = InnerLoopInputs {

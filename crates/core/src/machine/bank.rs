@@ -6,8 +6,8 @@ use pulp::{Arch, Scalar, Simd, WithSimd};
 
 use super::axis::DriveState;
 use super::inner_loops::{
-    Aligned, AxisBlock, CycleStatistics, CycleTicks, InnerLoopInputs, InnerLoopState, InnerLoops, TickRecord,
-    TickSpan,
+    Aligned, AxisBlock, CycleStatistics, CycleTicks, DriveFeedback, InnerLoopInputs, InnerLoopState,
+    InnerLoops, TickRecord, TickSpan,
 };
 use crate::drive::{EventDrivenTransmission, LoadState, MaxwellSlip};
 use crate::state_codec::StateCodec;
@@ -130,6 +130,11 @@ impl AxisBank {
     /// Returns the state of an axis.
     pub fn state(&self, axis: usize) -> InnerLoopState {
         with_lane!(&self.blocks, axis, block_and_lane, |block, lane| block.state(lane))
+    }
+
+    /// Returns the part of the state of an axis that its position loop reads.
+    pub fn feedback(&self, axis: usize) -> DriveFeedback {
+        with_lane!(&self.blocks, axis, block_and_lane, |block, lane| block.feedback(lane))
     }
 
     /// Sets the state of an axis.

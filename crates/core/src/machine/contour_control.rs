@@ -57,7 +57,7 @@ impl ContourControl {
     pub fn execute(&self, axes: &mut [Axis], parameters: &[AxisParameters], bank: &AxisBank) {
         let mut position: ContourVector = [0.0; CONTOUR_AXES];
         for (coordinate, &index) in position.iter_mut().zip(&self.axes) {
-            *coordinate = axes[index].measured_position(&parameters[index], &bank.state(index));
+            *coordinate = axes[index].measured_position(&parameters[index], &bank.feedback(index));
         }
         let setpoint = |j: i64| {
             let mut point = [0.0; CONTOUR_AXES];

@@ -196,6 +196,19 @@ impl TickSpan {
     }
 }
 
+/// State of an axis that its position loop reads.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DriveFeedback {
+    /// Angle of the motor, rad.
+    pub angle: f64,
+    /// Speed of the motor, rad/s.
+    pub speed: f64,
+    /// Wind-up of the transmission and the structure, rad of the motor.
+    pub wind_up: f64,
+    /// Largest amount by which i* exceeded its limit in the last position cycle, A.
+    pub max_current_excess: f64,
+}
+
 /// State of a block at the start of a tick.
 #[derive(Debug, Clone, PartialEq)]
 struct TickStart<const L: usize> {
@@ -278,6 +291,17 @@ impl<const L: usize> AxisBlock<L> {
     /// Returns the state in a lane.
     pub fn state(&self, lane: usize) -> InnerLoopState {
         self.state.0.lane(lane)
+    }
+
+    /// Returns the part of the state in a lane that the position loop reads.
+    pub fn feedback(&self, lane: usize) -> DriveFeedback {
+        let InnerLoopState { motor, load, contact, max_current_excess, .. } = &self.state.0;
+        DriveFeedback {
+            angle: motor.angle[lane],
+            speed: motor.speed[lane],
+            wind_up: load.wind_up[lane] + contact.structure[lane],
+            max_current_excess: max_current_excess[lane],
+        }
     }
 
     /// Sets the state in a lane.

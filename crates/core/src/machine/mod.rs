@@ -342,8 +342,8 @@ impl Machine {
             contour_control.execute(&mut self.axes, &parameters.axes, &self.bank);
         }
         for (index, (axis, p)) in self.axes.iter_mut().zip(&parameters.axes).take(psec.len()).enumerate() {
-            let state = self.bank.state(index);
-            let inputs = axis.execute_position_loop(p, &state);
+            let feedback = self.bank.feedback(index);
+            let inputs = axis.execute_position_loop(p, &feedback);
             self.bank.set_inputs(index, &inputs);
             if let Some(compensation) = &p.compensation {
                 let torque = |velocity_cycle| axis.compensation_torque(compensation, p, velocity_cycle);

@@ -5,6 +5,7 @@
 //! `Motor<[f64; L]>` holds `L` axes in memory, `Motor<Vector<S>>` holds the lanes of one SIMD register. Each
 //! operation gives bit-identical results in all three.
 
+mod aligned;
 mod dispatch;
 mod soa;
 mod unroll;
@@ -13,6 +14,7 @@ mod vector;
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+pub use aligned::{AlignedBuffer, LANES};
 pub use dispatch::{SliceOperation, vectorize};
 pub(crate) use soa::soa_struct;
 pub use unroll::Unroll2;

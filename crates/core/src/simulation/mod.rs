@@ -302,6 +302,11 @@ impl Simulation {
         self.timeline.psec_ahead(joint, cycles.saturating_add(1))
     }
 
+    /// Writes the previewed setpoints of all joints to `psec`, as [`psec_ahead`](Self::psec_ahead) returns them.
+    pub fn all_psec_ahead(&self, cycles: u32, psec: &mut [f64]) {
+        self.timeline.all_psec_ahead(cycles.saturating_add(1), psec);
+    }
+
     /// Returns true if the active motion that is planned while it runs needs its next chunk, see
     /// [`Timeline::needs_chunk`]. In real time it stops on its path until the chunk is appended.
     pub fn needs_chunk(&self) -> bool {

@@ -126,6 +126,7 @@ impl Trajectory {
 
     /// Returns the index of the last point at or before `time`. `hint` is the last result: it and the
     /// next index are tried first, so that sequential evaluation needs no search.
+    #[inline]
     pub(super) fn locate(&self, time: Nanoseconds, hint: usize) -> usize {
         let holds = |i: usize| {
             self.times.get(i).is_some_and(|&t| t <= time) && self.times.get(i + 1).is_none_or(|&t| time < t)
@@ -159,6 +160,7 @@ impl Trajectory {
     }
 
     /// Returns the position of [`state_near`](Self::state_near).
+    #[inline]
     pub(super) fn position_near(&self, column: usize, time: PathTime, hint: usize) -> f64 {
         let index = self.locate(time.ns, hint);
         if index >= self.segments() || time.since(self.times[index]) <= 0.0 {

@@ -9,6 +9,7 @@ use super::plan::{JointPlan, PlanKind};
 use super::spline::KinematicState;
 use super::timeline::{JointQueue, Timeline};
 use crate::units::{Nanoseconds, seconds};
+use std::ops::RangeInclusive;
 
 /// Path time with its feed override.
 #[derive(Debug, Clone)]
@@ -145,7 +146,11 @@ impl PlannedMotion for QueuedMotion<'_> {
 
 impl JointQueue {
     /// Returns the plan that commands the joint at instant `path_k` of the path time.
+    #[inline]
     fn plan_at(&self, path_k: i64) -> Option<&JointPlan> {
+        if self.plans.len() == 1 {
+            return self.plans.front();
+        }
         let after = self.plans.partition_point(|plan| plan.has_joined(path_k));
         self.plans.get(after.saturating_sub(1))
     }
@@ -214,23 +219,41 @@ impl Timeline {
     /// The preview contains everything accepted up to now, at the present feed override; beyond its end the last
     /// setpoint is held. Returns `None` for an unknown joint.
     pub fn psec_ahead(&self, joint: usize, cycles: u32) -> Option<f64> {
-        let queue = self.queues.get(joint)?;
-        if cycles == 0 {
-            return Some(queue.state.position);
-        }
+        let mut psec = None;
+        self.visit_ahead(joint..=joint, cycles, |_, position| psec = Some(position));
+        psec
+    }
+
+    /// Writes the previewed setpoints of all joints to `psec`, as [`psec_ahead`](Self::psec_ahead) returns them; further
+    /// values are unchanged.
+    pub fn all_psec_ahead(&self, cycles: u32, psec: &mut [f64]) {
+        self.visit_ahead(0..=usize::MAX, cycles, |joint, position| {
+            if let Some(value) = psec.get_mut(joint) {
+                *value = position;
+            }
+        });
+    }
+
+    /// Calls `visit` with the previewed setpoints of `joints`.
+    fn visit_ahead(&self, joints: RangeInclusive<usize>, cycles: u32, mut visit: impl FnMut(usize, f64)) {
         let instant = PlanInstant {
             k: (self.next_k - 1).saturating_add(i64::from(cycles)),
             path: self.clock.ahead(cycles, self.period),
         };
-        Some(match queue.plan_at(instant.path.instant(self.period)) {
-            Some(JointPlan { kind: PlanKind::Hold(newest), .. }) => {
-                self.stream
-                    .state_after(joint, instant.k - self.next_k, *newest, queue.state.position)
-                    .position
-            }
-            Some(plan) => plan.position(instant, self.period),
-            None => queue.state.position,
-        })
+        let path_k = instant.path.instant(self.period);
+        let queues = self.queues.iter().enumerate().skip(*joints.start());
+        for (joint, queue) in queues.take_while(|(joint, _)| joint <= joints.end()) {
+            let position = match queue.plan_at(path_k) {
+                _ if cycles == 0 => queue.state.position,
+                Some(JointPlan { kind: PlanKind::Hold(newest), .. }) => {
+                    let cycles = instant.k - self.next_k;
+                    self.stream.state_after(joint, cycles, *newest, queue.state.position).position
+                }
+                Some(plan) => plan.position(instant, self.period),
+                None => queue.state.position,
+            };
+            visit(joint, position);
+        }
     }
 
     /// Returns the state planned for `joint` at position cycle `k`, at the earliest that of the last commanded instant,

@@ -2,6 +2,9 @@
 
 use crate::units::Nanoseconds;
 
+/// Longest span of path time, ns: 2⁶², 146 years.
+const LONGEST: f64 = (1_u64 << 62) as f64;
+
 /// Path time, in ns of the position grid and a fraction of 1 ns from 0 to below 1.
 ///
 /// The fraction keeps setpoints smooth: rounding to 1 ns at 0.5 m/s and a position cycle of 2 ms would be a jerk of
@@ -20,10 +23,12 @@ impl PathTime {
 
     /// Returns the path time `ns` ≥ 0 nanoseconds later.
     pub fn after(self, ns: f64) -> Self {
-        let whole = ns.floor();
-        let fraction = self.fraction + (ns - whole);
-        let carry = if fraction >= 1.0 { 1.0 } else { 0.0 };
-        Self { ns: self.ns.saturating_add((whole + carry) as Nanoseconds), fraction: fraction - carry }
+        let ns = ns.min(LONGEST);
+        let whole = ns as Nanoseconds;
+        let fraction = self.fraction + (ns - whole as f64);
+        let carry = fraction >= 1.0;
+        let fraction = if carry { fraction - 1.0 } else { fraction };
+        Self { ns: self.ns.saturating_add(whole + Nanoseconds::from(carry)), fraction }
     }
 
     /// Returns the last instant of the position grid at or before this time.

@@ -71,6 +71,7 @@ impl TrajectoryColumn {
     }
 
     /// Returns the position at local `time`, m or rad.
+    #[inline]
     pub fn position(&self, time: PathTime) -> f64 {
         let trajectory = &self.trajectory;
         let is_on_points = self.approach.is_none() || time.ns >= trajectory.first_time();
@@ -106,6 +107,7 @@ impl JointPlan {
     }
 
     /// Returns the position at `instant`, at the earliest `join_k`, m or rad.
+    #[inline]
     pub fn position(&self, instant: PlanInstant, period: Nanoseconds) -> f64 {
         match &self.kind {
             PlanKind::Trajectory(path) => path.position(path.local_time(instant.path, period)),

@@ -268,9 +268,7 @@ impl<'a> Observer<'a> {
                     self.preview.copy_from_slice(row);
                 }
             } else {
-                for (joint, value) in self.preview.iter_mut().enumerate() {
-                    *value = simulation.psec_ahead(joint, periods).unwrap_or(*value);
-                }
+                simulation.all_psec_ahead(periods, &mut self.preview);
             }
             tracker.push(self.kinematics.forward(&self.preview));
         }

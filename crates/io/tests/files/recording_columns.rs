@@ -176,7 +176,7 @@ fn headers_name_channel_unit_and_axis() {
 #[test]
 fn the_position_of_a_motor_is_that_of_its_axis_without_another_one() {
     let channels = |header: &str| -> Vec<String> {
-        let recorded = Recorded::new("a.csv", &format!("{header}\n0,0,0,0\n"));
+        let recorded = Recorded::new("a.csv", format!("{header}\n0,0,0,0\n"));
         recorded
             .inspect()
             .columns

@@ -5,7 +5,7 @@
 //! positions. Distances and foot points are bit-identical to those of the search for single positions.
 
 use super::{ContourTracker, FootPoint, LOOK_BACK};
-use crate::simd::{SliceOperation, vectorize};
+use crate::simd::{AlignedBuffer, SliceOperation, vectorize};
 
 /// Number of coordinates of the search for several positions; positions have at most as many.
 pub(in crate::assess) const COLUMNS: usize = 3;
@@ -22,9 +22,9 @@ pub struct FootPoints {
     /// Nearest segments, by the index of their first setpoint.
     pub segment: Vec<u64>,
     /// Positions on the segments, from 0 at the start to 1 at the end.
-    pub along: Vec<f64>,
+    pub along: AlignedBuffer,
     /// Squares of the distances, m².
-    pub square_distance: Vec<f64>,
+    pub square_distance: AlignedBuffer,
 }
 
 impl FootPoints {
@@ -43,8 +43,8 @@ impl FootPoints {
     /// Sets the number of positions; their values are undetermined.
     pub fn resize(&mut self, count: usize) {
         self.segment.resize(count, 0);
-        self.along.resize(count, 0.0);
-        self.square_distance.resize(count, 0.0);
+        self.along.resize(count);
+        self.square_distance.resize(count);
     }
 }
 
