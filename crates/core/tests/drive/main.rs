@@ -2,6 +2,7 @@
 
 mod analytic;
 mod backlash;
+mod backlash_energy;
 mod bits;
 mod current_filter;
 mod drives;

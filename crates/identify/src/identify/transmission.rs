@@ -40,9 +40,11 @@ const UNCERTAIN: f64 = 0.5;
 const SYSTEMATIC: [f64; 2] = [0.005, 0.0];
 const WITH_CURRENT: [f64; 2] = [0.007, 0.36];
 const OF_DAMPING: [f64; 2] = [0.06, 0.36];
-/// Delay between the encoders that is reported, s and in standard errors.
+/// Least delay between the encoders that is reported, s.
 const DELAY: f64 = 5e-5;
-const DELAY_ERRORS: f64 = 3.0;
+/// Largest number of steps of the search for it, and step at which the search ends, s.
+const DELAY_STEPS: usize = 10;
+const DELAY_SETTLED: f64 = 1e-6;
 /// Largest half of the 95 % interval of the share of friction at the load.
 const UNCERTAIN_SHARE: f64 = 0.25;
 /// Standard errors of a 95 % interval.
@@ -192,21 +194,18 @@ pub(super) fn fit_transmission(
 }
 
 /// Returns the finding about encoders that are not sampled at the same instant.
-fn delay_finding(contact: &ContactFit) -> Option<Finding> {
-    let (delay, error) = (contact.delay.0, scatter(&contact.delay.1));
-    (delay.abs() > DELAY.max(DELAY_ERRORS * error)).then(|| {
-        let side = if delay > 0.0 { "older" } else { "newer" };
-        Finding::warning(
-            "encoder-delay",
-            format!(
-                "position is {:.2} ± {:.2} ms {side} than motor_position in the same row: the twist contains a part of the velocity, and \
-                 the damping is not reliable",
-                1e3 * delay.abs(),
-                1e3 * student(BLOCKS - 1) * error
-            ),
-            "sample both encoders at the same instant, or move one of the columns by this time",
-        )
-    })
+fn delay_finding(delay: ConfidenceInterval) -> Finding {
+    let side = if delay.value > 0.0 { "older" } else { "newer" };
+    Finding::warning(
+        "encoder-delay",
+        format!(
+            "position is {:.3} ± {:.3} ms {side} than motor_position in the same row; the twist is corrected by the velocity \
+             over this time",
+            1e3 * delay.value.abs(),
+            1e3 * (delay.bounds[1] - delay.value)
+        ),
+        "sample both encoders at the same instant",
+    )
 }
 
 struct TransmissionSearch<'a> {
@@ -226,8 +225,15 @@ impl TransmissionSearch<'_> {
                 "record a chirp of the setpoint and some reversals",
             )
         };
-        let closed = fit_contact(self.motions, has_tilt, Gap::Closed).ok_or_else(no_motion)?;
-        let free = fit_contact(self.motions, has_tilt, Gap::Free).ok_or_else(no_motion)?;
+        let fits = |motions: &[TwoEncoderMotion]| {
+            let closed = fit_contact(motions, has_tilt, Gap::Closed)?;
+            Some((closed, fit_contact(motions, has_tilt, Gap::Free)?))
+        };
+        let (mut closed, mut free) = fits(self.motions).ok_or_else(no_motion)?;
+        let delay = self.delay(&free, |motions| fit_contact(motions, has_tilt, Gap::Free));
+        if let Some(delay) = delay {
+            (closed, free) = fits(&self.without_delay(delay.value)).ok_or_else(no_motion)?;
+        }
         let gap = self.gap(&free);
         let is_open = gap.is_some_and(|gap| gap.is_certain());
         let contact = if is_open { &free } else { &closed };
@@ -242,7 +248,7 @@ impl TransmissionSearch<'_> {
         if !is_seen || !antiresonance.is_certain() {
             return Err(self.too_stiff(contact, antiresonance, is_seen));
         }
-        findings.extend(delay_finding(contact));
+        findings.extend(delay.map(delay_finding));
         if contact.r_squared < EXPLAINED {
             return Err(Finding::missing(
                 "poor-transmission",
@@ -302,6 +308,34 @@ impl TransmissionSearch<'_> {
             excluded_backlash,
             r_squared: contact.r_squared,
         })
+    }
+
+    /// Returns the time by which the position of the load is older than that of the motor, s; none without a clear delay.
+    fn delay(
+        &self,
+        first: &ContactFit,
+        fit: impl Fn(&[TwoEncoderMotion]) -> Option<ContactFit>,
+    ) -> Option<ConfidenceInterval> {
+        let (mut delay, mut step) = (0.0, first.delay.0);
+        if step.abs() < DELAY / 2.0 {
+            return None;
+        }
+        for _ in 0..DELAY_STEPS {
+            delay += step;
+            let found = fit(&self.without_delay(delay))?;
+            step = found.delay.0;
+            if step.abs() < DELAY_SETTLED {
+                let half = student(BLOCKS - 1) * scatter(&found.delay.1);
+                let is_clear = delay.abs() > DELAY.max(2.0 * half) && found.r_squared > first.r_squared;
+                return is_clear.then(|| ConfidenceInterval::about(delay, half));
+            }
+        }
+        None
+    }
+
+    /// Returns the motions with the position of the motor at the instants of that of the load.
+    fn without_delay(&self, delay: f64) -> Vec<TwoEncoderMotion> {
+        self.motions.iter().map(|motion| motion.without_delay(delay)).collect()
     }
 
     /// Returns the width of the gap; none if it is unknown.

@@ -191,7 +191,7 @@ fn encoders_that_are_not_sampled_at_the_same_instant_are_named() {
         let words: Vec<&str> = texts.iter().find(|t| t.contains(wanted)).expect(wanted).split(' ').collect();
         let [delay, half] = [words[2], words[4]].map(|word| word.parse::<f64>().expect(word));
         println!("{delay} ± {half} ms {wanted}");
-        assert!((delay - 0.5).abs() < half && half < 0.3, "{texts:?}");
+        assert!((delay - 0.5).abs() < half && half < 0.1, "{texts:?}");
         // The rest hardly depends on it.
         let masses = found.transmission.and_then(|fit| fit.masses).unwrap_or_else(|| panic!("{texts:?}"));
         for (interval, truth) in [(masses.stiffness, 150e6), (masses.load, 1300.0)] {

@@ -271,17 +271,33 @@ impl Response {
         [states[ANGLE], states[ANGLE] - states[WIND_UP]]
     }
 
-    /// Returns the friction torques, N·m, that bring motor and load to rest, limited to `bounds`.
+    /// Returns the friction torques, N·m, that bring motor and load to rest, limited to `bounds`: where a torque is at its
+    /// bound, the rest of the speed has its sign.
     #[inline(always)]
     pub fn stopping_torques(&self, bounds: [f64; PLACES]) -> [f64; PLACES] {
-        let mut torques = [0.0; PLACES];
-        // Each torque has little effect on the other speed within a tick.
-        for place in [1, 0, 1, 0] {
-            let other = 1 - place;
-            let speed = self.free[SPEED_AT[place]] - self.by_torque[other][SPEED_AT[place]] * torques[other];
-            torques[place] = self.torque_for(place, speed, bounds[place]);
+        let free = SPEED_AT.map(|at| self.free[at]);
+        let effect = |on: usize, of: usize| self.by_torque[of][SPEED_AT[on]];
+        let determinant = effect(0, 0) * effect(1, 1) - effect(0, 1) * effect(1, 0);
+        let both = [
+            (effect(1, 1) * free[0] - effect(0, 1) * free[1]) / determinant,
+            (effect(0, 0) * free[1] - effect(1, 0) * free[0]) / determinant,
+        ];
+        if both[0].abs() < bounds[0] && both[1].abs() < bounds[1] {
+            return both;
         }
-        torques
+        // One torque at its bound; the other one may be at its own.
+        for (place, limit) in [(0, bounds[0]), (0, -bounds[0]), (1, bounds[1]), (1, -bounds[1])] {
+            let other = 1 - place;
+            let speed = free[other] - effect(other, place) * limit;
+            let mut torques = [limit; PLACES];
+            torques[other] = self.torque_for(other, speed, bounds[other]);
+            let rest = free[place] - effect(place, place) * limit - effect(place, other) * torques[other];
+            if rest * limit >= 0.0 {
+                return torques;
+            }
+        }
+        // Rounding errors at a bound.
+        std::array::from_fn(|place| clamp_abs(both[place], bounds[place]))
     }
 
     /// Returns the friction torque, N·m, that brings one place to rest while the other has none, limited to `bound`.
@@ -332,7 +348,7 @@ impl Response {
                 if acts_at_end[place] {
                     self.stop(&mut states, place, bounds[place] * time);
                 } else if comes_to_rest[place] && !acts_at_end[1 - place] {
-                    // The rest of the iteration.
+                    // The rounding error.
                     states[SPEED_AT[place]] = 0.0;
                 }
             }

@@ -12,6 +12,7 @@ const ONE_DIRECTION: f64 = 0.999;
 const ROUNDING: f64 = 1e-9;
 
 /// Motion of motor and load in a section of a recording; all signals at the axis, with the same filter.
+#[derive(Debug, Clone)]
 pub(super) struct TwoEncoderMotion {
     filter: GaussianFilter,
     /// Number of samples at both ends that the filter continues beyond the section.
@@ -80,6 +81,13 @@ impl TwoEncoderMotion {
             force,
             noise,
         })
+    }
+
+    /// Returns the motion with a twist at the instants of the load's position, which is older than that of the motor by
+    /// `delay` seconds.
+    pub fn without_delay(&self, delay: f64) -> Self {
+        let twist = self.twist.iter().zip(&self.load.first).map(|(twist, speed)| twist - delay * speed);
+        TwoEncoderMotion { twist: twist.collect(), ..self.clone() }
     }
 
     /// Returns the indices of the samples that count.
