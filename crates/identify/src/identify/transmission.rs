@@ -14,16 +14,19 @@
 
 mod block_regression;
 mod contact;
+mod fit;
 mod motion;
 
 use std::f64::consts::TAU;
 
 use self::block_regression::{BlockRegression, scatter};
 use self::contact::{BLOCKS, ContactFit, Gap, UnknownGap, fit_contact};
+use self::fit::INTERVAL;
+pub use self::fit::{ConfidenceInterval, MassesFit, TransmissionFit};
 use self::motion::TwoEncoderMotion;
 use super::presliding::student;
 use crate::recording::{Finding, Signals};
-use virtual_axes_core::config::{AxisConfig, AxisKind, Periods, TransmissionConfig};
+use virtual_axes_core::config::{AxisConfig, AxisKind, Periods};
 use virtual_axes_core::units::{MICROMETER, Rounded, seconds};
 
 /// Smallest spread of the twist, and of its part by the acceleration, in standard deviations by the encoders.
@@ -33,8 +36,6 @@ const EXPLAINED: f64 = 0.9;
 /// Standard error of the inertia of the load by forces that the equation does not contain, relative to the inertia of motor
 /// and load, where the twist accelerates as the load does.
 const UNMODELED: f64 = 0.002;
-/// Largest half of a 95 % interval, relative to the value.
-const UNCERTAIN: f64 = 0.5;
 /// Standard errors relative to the value that all blocks share: by the filter, and, with the current, by a sampling period as
 /// long as the position cycle, within which the current varies; the latter grows with its square.
 const SYSTEMATIC: [f64; 2] = [0.005, 0.0];
@@ -45,102 +46,9 @@ const DELAY: f64 = 5e-5;
 /// Largest number of steps of the search for it, and step at which the search ends, s.
 const DELAY_STEPS: usize = 10;
 const DELAY_SETTLED: f64 = 1e-6;
-/// Largest half of the 95 % interval of the share of friction at the load.
-const UNCERTAIN_SHARE: f64 = 0.25;
-/// Standard errors of a 95 % interval.
-const INTERVAL: f64 = 1.96;
 /// Standard error of the width of the gap that all blocks share, relative to the twist by the encoders, to the spread of
 /// the twist, and to the width.
 const GAP: [f64; 3] = [1.0, 0.01, 0.01];
-
-/// Value with the bounds of its 95 % interval.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ConfidenceInterval {
-    /// Value.
-    pub value: f64,
-    /// Bounds.
-    pub bounds: [f64; 2],
-}
-
-impl ConfidenceInterval {
-    /// Creates an interval that is symmetric about the value.
-    fn about(value: f64, half: f64) -> Self {
-        ConfidenceInterval { value, bounds: [value - half, value + half] }
-    }
-
-    /// Returns the standard deviation of a normal distribution with the width of the interval.
-    pub fn error(&self) -> f64 {
-        (self.bounds[1] - self.bounds[0]) / (2.0 * INTERVAL)
-    }
-
-    /// Returns the interval within 0 … 1; none if it is too wide, or outside.
-    fn as_share(self) -> Option<Self> {
-        let [low, high] = self.bounds;
-        let is_share = high - low <= 2.0 * UNCERTAIN_SHARE && low <= 1.0 && high >= 0.0;
-        let within = |x: f64| x.clamp(0.0, 1.0);
-        is_share.then(|| ConfidenceInterval { value: within(self.value), bounds: self.bounds.map(within) })
-    }
-
-    fn is_certain(&self) -> bool {
-        self.bounds[1] - self.bounds[0] <= 2.0 * UNCERTAIN * self.value
-    }
-}
-
-/// Identified transmission of an axis, in SI units at the axis.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TransmissionFit {
-    /// Frequency of the antiresonance √(k/Ml)/2π, Hz.
-    pub antiresonance: ConfidenceInterval,
-    /// Masses and the values that need them; none if the recordings tell the antiresonance only.
-    pub masses: Option<MassesFit>,
-    /// Width of the gap, m or rad; none if it is not above 0.
-    pub backlash: Option<ConfidenceInterval>,
-    /// Width of the gap that is excluded, m or rad; none with an identified gap, or if the width is unknown.
-    pub excluded_backlash: Option<f64>,
-    /// Coefficient of determination R² of the acceleration of the load.
-    pub r_squared: f64,
-}
-
-/// Values of a transmission that need the inertia of the load, in SI units at the axis.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MassesFit {
-    /// Inertia of the load Ml, kg or kg·m².
-    pub load: ConfidenceInterval,
-    /// Inertia of motor and load, kg or kg·m².
-    pub total: ConfidenceInterval,
-    /// Stiffness k, N/m or N·m/rad.
-    pub stiffness: ConfidenceInterval,
-    /// Damping d, N·s/m or N·m·s/rad; none if it is not above 0.
-    pub damping: Option<ConfidenceInterval>,
-    /// Share of the friction that acts at the load, 0 … 1; none if the recordings do not determine it.
-    pub load_friction: Option<ConfidenceInterval>,
-}
-
-impl MassesFit {
-    /// Returns the share of the friction at the load, 0 if its interval contains 0; none if it is not determined.
-    pub(super) fn load_friction_share(&self) -> Option<f64> {
-        self.load_friction.map(|share| if share.bounds[0] > 0.0 { share.value } else { 0.0 })
-    }
-}
-
-impl TransmissionFit {
-    /// Sets the transmission of an axis, if the masses were identified; what is not determined is unchanged.
-    pub(super) fn apply(&self, axis: &mut AxisConfig) {
-        let Some(masses) = &self.masses else { return };
-        let (ratio, before) = (axis.transmission_ratio, axis.transmission);
-        let square = ratio * ratio;
-        let kept = |of: fn(&TransmissionConfig) -> f64| before.as_ref().map_or(0.0, of);
-        let backlash = self.backlash.map(|gap| gap.value / ratio).or(self.excluded_backlash.map(|_| 0.0));
-        axis.transmission = Some(TransmissionConfig {
-            stiffness: masses.stiffness.value * square,
-            damping: masses.damping.map_or(kept(|t| t.damping), |damping| damping.value * square),
-            load_inertia: masses.load.value * square,
-            backlash: backlash.unwrap_or(kept(|t| t.backlash)),
-            load_friction: masses.load_friction_share().unwrap_or(kept(|t| t.load_friction)),
-            structure: before.and_then(|before| before.structure),
-        });
-    }
-}
 
 /// Fits the transmission of `axis`, whose friction law and gravity are known, and reports findings.
 pub(super) fn fit_transmission(
