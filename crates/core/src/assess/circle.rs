@@ -6,7 +6,9 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 
 mod series;
 
-use series::{ScaledPoints, Sector};
+use series::{GroupAddition, LaneSums, Sector};
+
+use crate::simd::{LANES, vectorize};
 
 /// Number of bins of the polar angle: a tenth of a degree each.
 const BINS: usize = 3600;
@@ -55,13 +57,12 @@ const SPIKE_BINS: usize = 200;
 pub struct CircleAssessor {
     center: [f64; 2],
     radius: f64,
-    sums: Sums,
+    sums: LaneSums,
     /// Least and largest radial deviation, m.
     range: [f64; 2],
     bins: Box<[Bin]>,
-    /// Bin of the last point of a series.
+    /// Bin of the last point.
     sector: Sector,
-    scaled: ScaledPoints,
 }
 
 /// Figures of a circular path in one direction, m; see [`CircleAssessor`].
@@ -107,11 +108,10 @@ impl CircleAssessor {
         Self {
             center,
             radius,
-            sums: Sums::default(),
+            sums: LaneSums::default(),
             range: [f64::INFINITY, f64::NEG_INFINITY],
-            bins: vec![Bin::default(); BINS].into_boxed_slice(),
+            bins: vec![Bin::EMPTY; BINS].into_boxed_slice(),
             sector: Sector::of(0),
-            scaled: ScaledPoints::default(),
         }
     }
 
@@ -131,32 +131,25 @@ impl CircleAssessor {
         let deviation = (x * x + y * y).sqrt() - self.radius;
         self.sums.add(x / self.radius, y / self.radius, deviation / self.radius);
         self.range = [self.range[0].min(deviation), self.range[1].max(deviation)];
-        self.bins[bin_of(x, y)].add([x, y], deviation);
+        if !self.sector.contains(x, y) {
+            self.sector = self.sector.of_next_point(x, y);
+        }
+        self.bins[self.sector.bin].add([x, y], deviation);
         deviation
     }
 
-    /// Adds points of the path, m, as [`push`](Self::push) does one by one.
+    /// Adds points of the path, m, as [`push`](Self::push) does one by one, bit by bit.
     pub fn push_all(&mut self, xs: &[f64], ys: &[f64]) {
-        let (center, radius) = (self.center, self.radius);
-        self.scaled.compute(xs, ys, center, radius);
-        let points = xs.iter().zip(ys).zip(&self.scaled.points);
-        let (mut sums, [mut least, mut largest], mut sector) = (self.sums, self.range, self.sector);
-        for ((x, y), [u, v, scaled, deviation]) in points {
-            let (x, y) = (x - center[0], y - center[1]);
-            sums.add(*u, *v, *scaled);
-            least = least.min(*deviation);
-            largest = largest.max(*deviation);
-            if !sector.contains(x, y) {
-                sector = Sector::of(bin_of(x, y));
-            }
-            self.bins[sector.bin].add([x, y], *deviation);
-        }
-        (self.sums, self.range, self.sector) = (sums, [least, largest], sector);
+        let count = xs.len().min(ys.len());
+        let (xs, xs_after) = xs[..count].as_chunks::<LANES>();
+        let (ys, ys_after) = ys[..count].as_chunks::<LANES>();
+        vectorize(GroupAddition { assessor: &mut *self, xs, ys });
+        xs_after.iter().zip(ys_after).for_each(|(x, y)| _ = self.push(*x, *y));
     }
 
     /// Returns the figures so far, `None` without a point.
     pub fn report(&self) -> Option<CircleReport> {
-        let sums = self.sums.means()?;
+        let sums = self.sums.total().means()?;
         let mean = sums.deviation * self.radius;
         let full = self.is_full().then(|| Fit::new(&sums)).flatten().map(|fit| {
             let center = fit.center.map(|offset| offset * self.radius);
@@ -176,19 +169,19 @@ impl CircleAssessor {
         // The first bin begins at −π.
         [BINS / 2, BINS / 4 * 3, 0, BINS / 4].map(|reversal| {
             let bins = self.bins.iter().cycle().skip(BINS + reversal - SPIKE_BINS).take(2 * SPIKE_BINS);
-            let spikes = bins.filter_map(|bin| bin.points).flatten().map(|point| point.deviation - mean);
+            let spikes = bins.flat_map(Bin::points).map(|point| point.deviation - mean);
             spikes.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
         })
     }
 
     /// Returns true if every sector contains a point.
     fn is_full(&self) -> bool {
-        self.bins.chunks(BINS / SECTORS).all(|sector| sector.iter().any(|bin| bin.points.is_some()))
+        self.bins.chunks(BINS / SECTORS).all(|sector| sector.iter().any(|bin| !bin.is_empty()))
     }
 
     /// Returns the smallest and largest distance from `center`, which is relative to the nominal center.
     fn range_about(&self, [x, y]: [f64; 2]) -> Range {
-        let points = self.bins.iter().filter_map(|bin| bin.points).flatten();
+        let points = self.bins.iter().flat_map(Bin::points);
         points.fold(Range::EMPTY, |range, point| range.with((point.offset[0] - x).hypot(point.offset[1] - y)))
     }
 }
@@ -206,7 +199,8 @@ pub fn bidirectional(
     if !same || !paths.iter().all(|path| path.is_full()) {
         return None;
     }
-    let fit = Fit::new(&clockwise.sums.means()?.plus(&counterclockwise.sums.means()?).means()?)?;
+    let fit =
+        Fit::new(&clockwise.sums.total().means()?.plus(&counterclockwise.sums.total().means()?).means()?)?;
     let center = fit.center.map(|offset| offset * clockwise.radius);
     let range = paths.map(|path| path.range_about(center));
     Some(BidirectionalReport {
@@ -230,20 +224,35 @@ struct PathPoint {
 }
 
 /// Innermost and outermost point of a bin.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Bin {
-    points: Option<[PathPoint; 2]>,
+    inner: PathPoint,
+    outer: PathPoint,
 }
 
 impl Bin {
+    const EMPTY: Self = Bin {
+        inner: PathPoint { offset: [0.0; 2], deviation: f64::INFINITY },
+        outer: PathPoint { offset: [0.0; 2], deviation: f64::NEG_INFINITY },
+    };
+
+    fn is_empty(&self) -> bool {
+        self.inner.deviation > self.outer.deviation
+    }
+
+    /// Returns the two points; none of an empty bin.
+    fn points(&self) -> impl Iterator<Item = &PathPoint> {
+        [&self.inner, &self.outer].into_iter().filter(|_| !self.is_empty())
+    }
+
+    #[inline(always)]
     fn add(&mut self, offset: [f64; 2], deviation: f64) {
         let point = PathPoint { offset, deviation };
-        let [inner, outer] = self.points.get_or_insert([point; 2]);
-        if deviation < inner.deviation {
-            *inner = point;
+        if deviation < self.inner.deviation {
+            self.inner = point;
         }
-        if deviation > outer.deviation {
-            *outer = point;
+        if deviation > self.outer.deviation {
+            self.outer = point;
         }
     }
 }
@@ -283,31 +292,7 @@ struct Sums {
     deviation: f64,
 }
 
-impl Default for Sums {
-    fn default() -> Self {
-        Self {
-            count: 0.0,
-            products: Vector3::zeros(),
-            first: Vector2::zeros(),
-            right: Vector3::zeros(),
-            square: 0.0,
-            deviation: 0.0,
-        }
-    }
-}
-
 impl Sums {
-    fn add(&mut self, u: f64, v: f64, deviation: f64) {
-        // (r² − 1)/2 without cancellation.
-        let q = deviation + deviation * deviation / 2.0;
-        self.count += 1.0;
-        self.products += Vector3::new(u * u, u * v, v * v);
-        self.first += Vector2::new(u, v);
-        self.right += Vector3::new(u * q, v * q, q);
-        self.square += q * q;
-        self.deviation += deviation;
-    }
-
     fn plus(&self, other: &Self) -> Self {
         Self {
             count: self.count + other.count,

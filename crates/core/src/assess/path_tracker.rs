@@ -13,6 +13,7 @@ use super::tool_angle::{ToolAngles, tool_angle};
 use crate::kinematics::ToolPose;
 use crate::path::Path;
 
+use follow::FootBuffers;
 pub use follow::{FollowResult, PathDeviations};
 
 /// Search range before the furthest nearest point, m or rad, for an axis that moves back.
@@ -101,7 +102,7 @@ pub struct PathTracker {
     /// Last query, if it left the state of the tracker unchanged; an equal query has the same result.
     last: Option<CachedQuery>,
     /// Buffers for the foot points of poses.
-    feet: [Vec<f64>; 2],
+    feet: FootBuffers,
     angles: ToolAngles,
     scratch: Scratch,
 }
@@ -141,7 +142,7 @@ impl PathTracker {
             block: 0,
             s: 0.0,
             last: None,
-            feet: [Vec::new(), Vec::new()],
+            feet: FootBuffers::default(),
             angles: ToolAngles::default(),
             scratch,
         }

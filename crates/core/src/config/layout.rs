@@ -1,5 +1,7 @@
 //! Parameters of a machine with given joints, and suggestions for unknown keys.
 
+use std::sync::LazyLock;
+
 use super::definition::{MotorKind, ParameterDefinition, Scope};
 use super::error::{ConfigError, ValueSource};
 use super::machine::AxisKind;
@@ -45,19 +47,18 @@ impl ParameterLayout {
         if let Some(definition) = plain_definition(key) {
             return Ok(definition);
         }
-        let candidates = |suffix| axis_definitions().filter(move |definition| definition.key == suffix);
         let found = key.split_once('.').and_then(|(name, suffix)| {
             let joint = self.joints.iter().find(|joint| joint.name == name)?;
             Some((joint, suffix))
         });
         if let Some((joint, suffix)) = found
             && let Some(definition) =
-                candidates(suffix).find(|definition| definition.applies_to(joint.axis, joint.motor))
+                axis_definitions_of(suffix).find(|definition| definition.applies_to(joint.axis, joint.motor))
         {
             return Ok(definition);
         }
         self.check_name(key, at)?;
-        let excluded = found.and_then(|(joint, suffix)| Some((joint, candidates(suffix).next()?)));
+        let excluded = found.and_then(|(joint, suffix)| Some((joint, axis_definitions_of(suffix).next()?)));
         Err(match excluded {
             Some((joint, definition)) => ConfigError::NotApplicable {
                 at: at.clone(),
@@ -73,14 +74,13 @@ impl ParameterLayout {
         let known = plain_definition(key).is_some()
             || key.split_once('.').is_some_and(|(name, suffix)| {
                 self.joints.iter().any(|joint| joint.name == name)
-                    && axis_definitions().any(|definition| definition.key == suffix)
+                    && axis_definitions_of(suffix).next().is_some()
             });
         if known {
             return Ok(());
         }
-        let other_joint = key
-            .split_once('.')
-            .filter(|(_, suffix)| axis_definitions().any(|definition| definition.key == *suffix));
+        let other_joint =
+            key.split_once('.').filter(|(_, suffix)| axis_definitions_of(suffix).next().is_some());
         match other_joint {
             Some((name, _)) if !self.joints.is_empty() => Err(ConfigError::NotApplicable {
                 at: at.clone(),
@@ -156,9 +156,25 @@ fn axis_definitions() -> impl Iterator<Item = &'static ParameterDefinition> {
     DEFINITIONS.iter().filter(|definition| definition.scope == Scope::Axis)
 }
 
+/// Returns the definitions of the axis parameter `key`, which depend on the types of axis and motor.
+fn axis_definitions_of(key: &str) -> impl Iterator<Item = &'static ParameterDefinition> {
+    definitions_of(key).filter(|definition| definition.scope == Scope::Axis)
+}
+
 /// Returns the definition of the machine or node parameter `key`.
 pub(super) fn plain_definition(key: &str) -> Option<&'static ParameterDefinition> {
-    DEFINITIONS.iter().find(|definition| definition.scope != Scope::Axis && definition.key == key)
+    definitions_of(key).find(|definition| definition.scope != Scope::Axis)
+}
+
+/// Returns the definitions with the key `key`, in the order of the schema.
+fn definitions_of(key: &str) -> impl Iterator<Item = &'static ParameterDefinition> {
+    static SORTED: LazyLock<Vec<&ParameterDefinition>> = LazyLock::new(|| {
+        let mut sorted: Vec<&ParameterDefinition> = DEFINITIONS.iter().collect();
+        sorted.sort_by_key(|definition| definition.key);
+        sorted
+    });
+    let first = SORTED.partition_point(|definition| definition.key < key);
+    SORTED[first..].iter().copied().take_while(move |definition| definition.key == key)
 }
 
 /// Returns the requirement that the joint name `name` violates, a verb phrase after "must".

@@ -47,6 +47,12 @@ impl Poses {
         self.axes.each_ref().map(|values| &**values)
     }
 
+    /// Returns X, Y and Z of the tips, m, workpiece frame, in vectors; those beyond the last pose are undetermined.
+    #[inline(always)]
+    pub(crate) fn tip_lanes(&self) -> [&[[f64; LANES]]; 3] {
+        self.tips.each_ref().map(AlignedBuffer::lanes)
+    }
+
     /// Returns the tip at `instant`, m, workpiece frame.
     ///
     /// # Panics

@@ -7,6 +7,7 @@ use crate::config::{AxisKind, MachineConfig};
 use crate::kinematics::{AxisRole, Kinematics, Poses, TableAngles};
 use crate::machine::Machine;
 use crate::path::Frame;
+use crate::simd::{LANES, SliceOperation, vectorize};
 use crate::simulation::{Simulation, contour_preview_cycles};
 use crate::statistics::rms_of_sum;
 use crate::units::seconds;
@@ -18,24 +19,51 @@ use super::definition::{Measures, Trial, TrialOutcome};
 use super::figures::{AxisFigures, ContourFigures, Figures, OrientationFigures, Reference};
 use super::recorder::{SignalRecorder, ToolSample};
 
-/// Largest value and RMS of an error.
+/// Largest value and RMS of an error, in one part per lane.
 #[derive(Debug, Clone, Copy, Default)]
 struct ErrorStatistics {
-    max: f64,
-    sum_of_squares: f64,
+    max: [f64; LANES],
+    sum_of_squares: [f64; LANES],
     count: u64,
 }
 
 impl ErrorStatistics {
-    fn push(&mut self, value: f64) {
-        // NaN is not larger.
-        self.max = if value > self.max { value } else { self.max };
-        self.sum_of_squares += value * value;
-        self.count += 1;
+    fn max(&self) -> f64 {
+        self.max.into_iter().fold(0.0, f64::max)
     }
 
     fn rms(&self) -> f64 {
-        rms_of_sum(self.sum_of_squares, self.count).unwrap_or(0.0)
+        rms_of_sum(self.sum_of_squares.into_iter().sum(), self.count).unwrap_or(0.0)
+    }
+}
+
+/// Addition of errors to their statistics.
+struct ErrorAddition<'a> {
+    errors: &'a [f64],
+    statistics: &'a mut ErrorStatistics,
+}
+
+impl SliceOperation for ErrorAddition<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let ErrorAddition { errors, statistics } = self;
+        let (groups, rest) = errors.as_chunks::<LANES>();
+        let (mut max, mut sums) = (statistics.max, statistics.sum_of_squares);
+        for group in groups {
+            for k in 0..LANES {
+                // NaN is not larger.
+                max[k] = if group[k] > max[k] { group[k] } else { max[k] };
+                sums[k] += group[k] * group[k];
+            }
+        }
+        for (k, &error) in rest.iter().enumerate() {
+            max[k] = if error > max[k] { error } else { max[k] };
+            sums[k] += error * error;
+        }
+        (statistics.max, statistics.sum_of_squares) = (max, sums);
+        statistics.count += errors.len() as u64;
     }
 }
 
@@ -185,16 +213,11 @@ impl<'a> Observer<'a> {
             (Tracker::Setpoints(tracker), _) => tracker.follow(poses, deviations)?,
             (Tracker::Path(_), None) => return None,
         };
-        // Local copies stay in registers.
-        let (mut contour, mut within_ends, mut orientation) =
-            (self.contour, self.within_ends, self.orientation);
-        let each = deviations.distance.iter().zip(&deviations.within_ends).zip(&deviations.orientation);
-        for ((&distance, &within), &angle) in each {
-            contour.push(distance);
-            within_ends.push(within);
-            orientation.push(angle);
+        let statistics = [&mut self.contour, &mut self.within_ends, &mut self.orientation];
+        let errors = [&deviations.distance, &deviations.within_ends, &deviations.orientation];
+        for (statistics, errors) in statistics.into_iter().zip(errors) {
+            vectorize(ErrorAddition { errors, statistics });
         }
-        (self.contour, self.within_ends, self.orientation) = (contour, within_ends, orientation);
         self.corners.observe(cycle.times, &deviations.within_ends);
         Some(first)
     }
@@ -234,13 +257,13 @@ impl<'a> Observer<'a> {
             axes: axes.collect(),
             contour: reference.map(|reference| ContourFigures {
                 reference,
-                max: self.contour.max,
+                max: self.contour.max(),
                 rms: self.contour.rms(),
-                max_within_ends: self.within_ends.max,
+                max_within_ends: self.within_ends.max(),
                 rms_within_ends: self.within_ends.rms(),
             }),
             orientation: has_orientation
-                .then(|| OrientationFigures { max: self.orientation.max, rms: self.orientation.rms() }),
+                .then(|| OrientationFigures { max: self.orientation.max(), rms: self.orientation.rms() }),
             circles: self.circles.figures(),
             more_circles: self.circles.more(),
             bidirectional: self.circles.bidirectional(),

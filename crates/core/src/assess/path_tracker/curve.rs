@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use super::{NearestPoint, PathDeviations, PathTracker, SEARCH_BACK};
+use super::{FootBuffers, NearestPoint, PathDeviations, PathTracker, SEARCH_BACK};
 use crate::assess::curve_cells::{CurveCell, CurveCells, Polynomials, derivatives, value};
 use crate::assess::path_shape::TipCurve;
 use crate::assess::tool_angle::{ToolAngles, tool_angle};
@@ -47,7 +47,7 @@ impl PathTracker {
         let shapes = Arc::clone(&self.shapes);
         let TipCurve::Sampled { cells: Some(cells), .. } = &shapes[self.block] else { return None };
         self.find_feet(cells, poses, found)?;
-        let feet = &self.feet[0];
+        let feet = &self.feet.first;
         let extreme =
             |pick: fn(f64, f64) -> f64, start: f64, values: &[f64]| values.iter().copied().fold(start, pick);
         let range = FeetRange {
@@ -61,10 +61,10 @@ impl PathTracker {
         found.within_ends.copy_from_slice(&found.distance);
         self.angles.write_angles(&mut found.orientation);
         let start = self.path.start_of(self.block);
-        let (s, pose) = (self.feet[0][0], poses.get(0));
+        let (s, pose) = (self.feet.first[0], poses.get(0));
         let axis = shapes[self.block].axis(&self.path, self.block, s, &mut self.scratch);
         self.furthest = self.furthest.max(start + range.last);
-        self.s = self.feet[0][poses.len() - 1];
+        self.s = self.feet.first[poses.len() - 1];
         self.last = None;
         Some(NearestPoint {
             progress: start + s,
@@ -83,14 +83,14 @@ impl PathTracker {
         self.angles.resize(count);
         let (point, tangent, _) = cells.tip_derivatives(self.s);
         let slope = tangent / tangent.norm_squared();
-        let [feet, guesses] = &mut self.feet;
-        feet.clear();
-        feet.resize(count, f64::NAN);
+        let FootBuffers { first: feet, second: guesses, .. } = &mut self.feet;
+        feet.resize(count);
+        guesses.resize(count);
+        feet.fill(f64::NAN);
         let [xs, ys, zs] = poses.tips();
-        guesses.clear();
-        guesses.extend(xs.iter().zip(ys).zip(zs).map(|((x, y), z)| {
-            self.s + (x - point.x) * slope.x + (y - point.y) * slope.y + (z - point.z) * slope.z
-        }));
+        for (guess, ((x, y), z)) in guesses.iter_mut().zip(xs.iter().zip(ys).zip(zs)) {
+            *guess = self.s + (x - point.x) * slope.x + (y - point.y) * slope.y + (z - point.z) * slope.z;
+        }
         let ends = [guesses[0], guesses[count - 1]].map(|s| cells.index_at(s));
         for cell in &cells.cells()[ends[0].min(ends[1])..=ends[0].max(ends[1])] {
             let (distances, angles) = (&mut found.distance, &mut self.angles);

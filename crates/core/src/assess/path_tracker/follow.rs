@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 use super::{Candidate, NearestPoint, PathTracker, SEARCH_BACK};
 use crate::assess::path_shape::{TipCurve, circle_coordinates, distance_to_circle, line_parameter};
 use crate::kinematics::{Poses, ToolPose};
+use crate::simd::{AlignedBuffer, LANES, SliceOperation, vectorize};
 
 /// Distance from the ends of the search range that all foot points keep, m: more than rounding.
 const CLEARANCE: f64 = 1e-9;
@@ -204,14 +205,8 @@ impl PathTracker {
     fn follow_line(&mut self, poses: &Poses, range: SearchRange, distances: &mut Vec<f64>) -> bool {
         let TipCurve::Segment { from, slope, .. } = &self.shapes[range.block] else { return false };
         let (from, slope) = (*from, *slope);
-        let [feet, _] = &mut self.feet;
-        feet.resize(poses.len(), 0.0);
-        distances.resize(poses.len(), 0.0);
-        for ((foot, distance), tip) in feet.iter_mut().zip(&mut *distances).zip(tips(poses)) {
-            let s = line_parameter(tip, from, slope);
-            *foot = s;
-            *distance = (tip - (from + slope * s)).norm();
-        }
+        vectorize(LineFeet { poses, from, slope, buffers: &mut self.feet });
+        let feet = &self.feet.first[..poses.len()];
         // The comparison treats NaN as outside.
         let inside =
             feet.iter().fold(true, |inside, s| inside & (*s > CLEARANCE && *s < range.high[0] - CLEARANCE));
@@ -224,6 +219,7 @@ impl PathTracker {
             let progress = (range.start + before).min(self.path.start_of(range.block + 1));
             self.furthest = self.furthest.max(progress);
             self.last = None;
+            self.feet.write_distances(distances);
         }
         inside
     }
@@ -245,28 +241,14 @@ impl PathTracker {
         if !(one_turn && first > range.low + CLEARANCE && first < range.high[0] - CLEARANCE) {
             return false;
         }
-        let [xs, ys] = &mut self.feet;
-        xs.resize(poses.len(), 0.0);
-        ys.resize(poses.len(), 0.0);
-        distances.resize(poses.len(), 0.0);
-        let outputs = xs.iter_mut().zip(ys.iter_mut()).zip(&mut *distances);
-        for (((x_out, y_out), distance), tip) in outputs.zip(tips(poses)) {
-            let ([x, y, z], off) = circle_coordinates(tip, center, &plane);
-            (*x_out, *y_out) = (x, y);
-            *distance = distance_to_circle(off, z, radius);
-        }
         let (least, direction) = (MIN_ADVANCE * radius * radius, turn.signum());
-        let (x0, y0) = (xs[0], ys[0]);
-        let steps = xs.iter().zip(ys.iter()).zip(xs[1..].iter().zip(&ys[1..]));
-        // The comparison treats NaN as not ahead.
-        let ahead = steps.fold(true, |ahead, ((x_before, y_before), (x, y))| {
-            let forwards = (x_before * y - y_before * x) * direction > least;
-            ahead & forwards & (x0 * x + y0 * y > 0.0)
-        });
-        if !ahead {
+        let buffers = &mut self.feet;
+        if !vectorize(CircleFeet { poses, center, plane, radius, least, direction, buffers }) {
             return false;
         }
-        let (x, y) = (xs[poses.len() - 1], ys[poses.len() - 1]);
+        self.feet.write_distances(distances);
+        let (xs, ys) = (&self.feet.first, &self.feet.second);
+        let (x0, y0, x, y) = (xs[0], ys[0], xs[poses.len() - 1], ys[poses.len() - 1]);
         let swept = ((x0 * y - y0 * x) * direction).atan2(x0 * x + y0 * y);
         let end = first + swept / turn.abs();
         end < range.high[0] - CLEARANCE && self.is_within_ends(range, first, end)
@@ -280,5 +262,108 @@ impl PathTracker {
             && most < length - CLEARANCE
             && range.start + least > 0.0
             && range.start + most + CLEARANCE < self.path.length()
+    }
+}
+
+/// Buffers for the foot points of consecutive poses.
+#[derive(Debug, Clone, Default)]
+pub(super) struct FootBuffers {
+    /// Arc length of the foot point on a line or another curve, or first coordinate of the pose in the plane of a circle, m.
+    pub first: AlignedBuffer,
+    /// Second coordinate of the pose, m, or estimate of the arc length on another curve.
+    pub second: AlignedBuffer,
+    /// Distance from the curve, m.
+    distances: AlignedBuffer,
+}
+
+impl FootBuffers {
+    /// Sets the number of poses and returns the buffers in vectors.
+    #[inline(always)]
+    fn lanes(&mut self, count: usize) -> [&mut [[f64; LANES]]; 3] {
+        [&mut self.first, &mut self.second, &mut self.distances].map(|buffer| {
+            buffer.resize(count);
+            &mut buffer.lanes_mut()[..count.div_ceil(LANES)]
+        })
+    }
+
+    /// Replaces the contents of `distances` by those of the poses.
+    fn write_distances(&self, distances: &mut Vec<f64>) {
+        distances.clear();
+        distances.extend_from_slice(&self.distances);
+    }
+}
+
+/// Computation of the foot points of poses on a line.
+struct LineFeet<'a> {
+    poses: &'a Poses,
+    from: Vector3<f64>,
+    slope: Vector3<f64>,
+    buffers: &'a mut FootBuffers,
+}
+
+impl SliceOperation for LineFeet<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let LineFeet { poses, from, slope, buffers } = self;
+        let [feet, _, distances] = buffers.lanes(poses.len());
+        let [xs, ys, zs] = poses.tip_lanes();
+        let tips = xs.iter().zip(ys).zip(zs);
+        for ((foot, distance), ((x, y), z)) in feet.iter_mut().zip(distances).zip(tips) {
+            let (x, y, z, mut arc_length, mut length) = (*x, *y, *z, [0.0; LANES], [0.0; LANES]);
+            for k in 0..LANES {
+                let tip = Vector3::new(x[k], y[k], z[k]);
+                let s = line_parameter(tip, from, slope);
+                arc_length[k] = s;
+                length[k] = (tip - (from + slope * s)).norm();
+            }
+            (*foot, *distance) = (arc_length, length);
+        }
+    }
+}
+
+/// Computation of the coordinates of poses in the plane of a circle.
+struct CircleFeet<'a> {
+    poses: &'a Poses,
+    center: Vector3<f64>,
+    plane: [Vector3<f64>; 3],
+    radius: f64,
+    /// Smallest product of the radii of consecutive foot points that counts as forward, m².
+    least: f64,
+    /// Sign of the direction of rotation.
+    direction: f64,
+    buffers: &'a mut FootBuffers,
+}
+
+impl SliceOperation for CircleFeet<'_> {
+    type Output = bool;
+
+    /// Returns true if each foot point lies clearly ahead of the one before, less than a quarter turn from the first.
+    #[inline(always)]
+    fn run(self) -> bool {
+        let CircleFeet { poses, center, plane, radius, least, direction, buffers } = self;
+        let [us, vs, distances] = buffers.lanes(poses.len());
+        let [xs, ys, zs] = poses.tip_lanes();
+        let outputs = us.iter_mut().zip(vs).zip(distances);
+        for (((u, v), distance), ((x, y), z)) in outputs.zip(xs.iter().zip(ys).zip(zs)) {
+            let (x, y, z) = (*x, *y, *z);
+            let mut values = [[0.0; LANES]; 3];
+            for k in 0..LANES {
+                let tip = Vector3::new(x[k], y[k], z[k]);
+                let ([first, second, off_plane], off) = circle_coordinates(tip, center, &plane);
+                (values[0][k], values[1][k]) = (first, second);
+                values[2][k] = distance_to_circle(off, off_plane, radius);
+            }
+            [*u, *v, *distance] = values;
+        }
+        let (us, vs) = (&buffers.first[..], &buffers.second[..]);
+        let (u0, v0) = (us[0], vs[0]);
+        let steps = us.iter().zip(vs).zip(us[1..].iter().zip(&vs[1..]));
+        // The comparison treats NaN as not ahead.
+        steps.fold(true, |ahead, ((u_before, v_before), (u, v))| {
+            let forwards = (u_before * v - v_before * u) * direction > least;
+            ahead & forwards & (u0 * u + v0 * v > 0.0)
+        })
     }
 }
