@@ -174,7 +174,7 @@ impl PathTracker {
             point: best.point,
             axis,
             distance: best.distance,
-            within_ends: self.within_ends(&best, pose),
+            within_ends: self.within_ends(best.progress, pose.tip - best.point, best.distance),
             orientation: tool_angle(&axis, &pose.axis),
         };
         let stays = before == (self.furthest, self.block, self.s);
@@ -182,19 +182,19 @@ impl PathTracker {
         nearest
     }
 
-    /// Returns [`NearestPoint::within_ends`].
-    fn within_ends(&self, best: &Candidate, pose: &ToolPose) -> f64 {
-        let direction = if best.progress >= self.path.length() {
+    /// Returns [`NearestPoint::within_ends`] for a nearest point at `progress` with the vector `error` to the tip, m, of
+    /// the length `distance`.
+    fn within_ends(&self, progress: f64, error: Vector3<f64>, distance: f64) -> f64 {
+        let direction = if progress >= self.path.length() {
             self.ends[1]
-        } else if best.progress <= 0.0 {
+        } else if progress <= 0.0 {
             self.ends[0].map(|direction| -direction)
         } else {
             None
         };
-        let Some(outwards) = direction else { return best.distance };
-        let error = pose.tip - best.point;
+        let Some(outwards) = direction else { return distance };
         let along = error.dot(&outwards);
-        if along > 0.0 { (error - outwards * along).norm() } else { best.distance }
+        if along > 0.0 { (error - outwards * along).norm() } else { distance }
     }
 
     fn search(&mut self, pose: &ToolPose, window: SearchWindow) -> Candidate {

@@ -43,6 +43,8 @@ pub struct AxisParameters {
     backlash_compensation: BacklashCompensation,
     /// Weight of the wind-up in the angle that the position controller reads: 1 with an encoder at the load, else 0.
     wind_up_feedback: f64,
+    /// Number of future setpoints that the controllers read.
+    preview: usize,
     position_delay: TickDelay,
     velocity_delay: FeedforwardDelay,
     torque_delay: FeedforwardDelay,
@@ -87,12 +89,10 @@ impl AxisParameters {
 
     /// Returns the preview: number of future setpoints that the controllers read.
     pub fn preview_length(&self) -> usize {
-        self.setpoint_window().preview
+        self.preview
     }
 
     fn setpoint_window(&self) -> SetpointWindow {
-        let delay = -self.position_delay.index_at_cycle_start(0);
-        let compensation = self.compensation.as_ref().map_or(0, FrictionCompensation::preview);
         SetpointWindow {
             delay: self.delays.longest(),
             lookback: (self.position.lookback() as usize).max(if self.has_contour_control {
@@ -100,7 +100,7 @@ impl AxisParameters {
             } else {
                 0
             }),
-            preview: (self.position.preview() - delay).max(compensation).max(0) as usize,
+            preview: self.preview,
         }
     }
 
@@ -118,6 +118,9 @@ impl AxisParameters {
         let delays = Delays { friction: if compensation.is_some() { delays.friction } else { 0 }, ..delays };
         let velocity_scale = 1.0 / motor.torque_constant;
         let plant = Plant::new(axis, tick)?;
+        let position_delay = TickDelay::new(delays.position, ticks);
+        let delay = -position_delay.index_at_cycle_start(0);
+        let of_compensation = compensation.as_ref().map_or(0, FrictionCompensation::preview);
         Ok(AxisParameters {
             loops: InnerLoops {
                 plant,
@@ -133,7 +136,6 @@ impl AxisParameters {
             event_driven: EventDrivenTransmission::new(axis, tick)?.map(Arc::new),
             elements: MaxwellSlip::of_axis(axis, &plant, tick).map(Arc::new),
             backlash_compensation: BacklashCompensation::new(axis, seconds(periods.position)),
-            position,
             controller,
             feedforward: Feedforward::new(
                 &feedforward_config(axis),
@@ -143,9 +145,11 @@ impl AxisParameters {
             compensation,
             has_contour_control: false,
             is_coupled: false,
-            position_delay: TickDelay::new(delays.position, ticks),
+            preview: (position.preview() - delay).max(of_compensation).max(0) as usize,
+            position_delay,
             velocity_delay: FeedforwardDelay::new(delays.velocity, periods),
             torque_delay: FeedforwardDelay::new(delays.torque, periods),
+            position,
             delays,
             wind_up_feedback: f64::from(u8::from(axis.position_loop.feedback == PositionFeedback::Load)),
             transmission_ratio: axis.transmission_ratio,

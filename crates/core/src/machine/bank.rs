@@ -10,6 +10,7 @@ use super::inner_loops::{
     InnerLoops, TickRecord, TickSpan,
 };
 use crate::drive::{EventDrivenTransmission, LoadState, MaxwellSlip};
+use crate::simd::LANES;
 use crate::state_codec::StateCodec;
 
 /// Lanes of the small block, used for up to four axes if the widest vector of the processor has at most four lanes:
@@ -170,12 +171,21 @@ impl AxisBank {
         with_lane!(&self.blocks, axis, block_and_lane, |block, lane| block.motors[tick].0.current[lane])
     }
 
-    /// Writes the angles of the load of an axis at the ticks of the last position cycle to `angles`, rad of the motor.
-    #[inline]
-    pub fn angles(&self, axis: usize, angles: &mut [f64]) {
+    /// Writes the angles of the load of an axis at the ticks of the last position cycle, times `ratio`, to `positions`.
+    pub fn positions(&self, axis: usize, ratio: f64, positions: &mut [f64]) {
         with_lane!(&self.blocks, axis, block_and_lane, |block, lane| {
-            angles.iter_mut().zip(&block.motors).for_each(|(angle, row)| *angle = row.0.angle[lane]);
-            angles.iter_mut().zip(&block.loads).for_each(|(angle, row)| *angle -= row.0.wind_up[lane]);
+            let count = positions.len().min(block.motors.len());
+            let (groups, rest) = positions[..count].as_chunks_mut::<LANES>();
+            let (rows, last_rows) = block.motors[..count].as_chunks::<LANES>();
+            for (group, rows) in groups.iter_mut().zip(rows) {
+                *group = std::array::from_fn(|tick| rows[tick].0.angle[lane] * ratio);
+            }
+            for (position, row) in rest.iter_mut().zip(last_rows) {
+                *position = row.0.angle[lane] * ratio;
+            }
+            for ((position, motor), load) in positions.iter_mut().zip(&block.motors).zip(&block.loads) {
+                *position = (motor.0.angle[lane] - load.0.wind_up[lane]) * ratio;
+            }
         });
     }
 

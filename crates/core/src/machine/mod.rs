@@ -406,9 +406,8 @@ impl Machine {
     /// Panics if the axis is out of range.
     #[inline]
     pub fn positions(&self, axis: usize, positions: &mut [f64]) {
-        let plant = &self.parameters.axes[axis].loops.plant;
-        self.bank.angles(axis, positions);
-        positions.iter_mut().for_each(|value| *value = plant.position(*value));
+        let ratio = self.parameters.axes[axis].loops.plant.position(1.0);
+        self.bank.positions(axis, ratio, positions);
     }
 
     /// Returns the current of an axis, with its sign, at the tick of the last position cycle with the largest |i|, A.

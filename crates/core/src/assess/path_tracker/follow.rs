@@ -8,13 +8,15 @@ use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
-use super::{Candidate, NearestPoint, PathTracker, SEARCH_BACK};
+use super::{NearestPoint, PathTracker, SEARCH_BACK};
 use crate::assess::path_shape::{TipCurve, circle_coordinates, distance_to_circle, line_parameter};
-use crate::kinematics::{Poses, ToolPose};
+use crate::kinematics::Poses;
 use crate::simd::{AlignedBuffer, LANES, SliceOperation, vectorize};
 
 /// Distance from the ends of the search range that all foot points keep, m: more than rounding.
 const CLEARANCE: f64 = 1e-9;
+/// Bound of rounding in an arc length or an angle, relative to the largest value in its computation.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// Smallest angle between consecutive foot points on a circle that counts as forward, rad.
 const MIN_ADVANCE: f64 = 1e-9;
 
@@ -112,9 +114,13 @@ impl PathTracker {
             && begin >= self.path.length()
             && self.all_beyond_end(poses, &first)
         {
-            for index in 1..=last {
-                found.push(&self.nearest_at_end(&poses.get(index), &first));
+            for tip in tips(poses).skip(1) {
+                let error = tip - first.point;
+                let distance = error.norm();
+                found.distance.push(distance);
+                found.within_ends.push(self.within_ends(first.progress, error, distance));
             }
+            found.orientation.resize(poses.len(), first.orientation);
             return Some(FollowResult { first, closed_form: true });
         }
         let range = if last > 1 { self.range(before, [begin, until(last)]) } else { None };
@@ -151,13 +157,15 @@ impl PathTracker {
         // The comparisons treat NaN as not beyond the end.
         match &self.shapes[block] {
             TipCurve::Segment { from, slope, .. } => {
-                tips(poses).all(|tip| line_parameter(tip, *from, *slope) > length + CLEARANCE)
+                let beyond = length + ROUNDING * (length + from.amax());
+                tips(poses).all(|tip| line_parameter(tip, *from, *slope) > beyond)
             }
             // The start of the search range is less than a quarter turn before the end, and further away.
             TipCurve::Circle { center, plane, radius, turn, .. }
                 if SEARCH_BACK * turn.abs() < 1.0 && length > SEARCH_BACK =>
             {
-                let (least, direction) = (MIN_ADVANCE * radius * radius, turn.signum());
+                let least = ROUNDING * (length * turn.abs() + center.amax() / radius) * radius * radius;
+                let direction = turn.signum();
                 let ([x0, y0, _], _) = circle_coordinates(first.point, *center, plane);
                 tips(poses).all(|tip| {
                     let ([x, y, _], _) = circle_coordinates(tip, *center, plane);
@@ -166,20 +174,6 @@ impl PathTracker {
             }
             _ => false,
         }
-    }
-
-    /// Returns the nearest point to a pose beyond the path's last point; `first` is the result at that
-    /// point.
-    fn nearest_at_end(&self, pose: &ToolPose, first: &NearestPoint) -> NearestPoint {
-        let distance = (pose.tip - first.point).norm();
-        let end = Candidate {
-            block: self.block,
-            s: self.s,
-            progress: first.progress,
-            point: first.point,
-            distance,
-        };
-        NearestPoint { distance, within_ends: self.within_ends(&end, pose), ..*first }
     }
 
     /// Returns the search range of poses if it lies in one block; the first pose has been evaluated.
