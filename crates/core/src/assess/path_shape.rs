@@ -302,3 +302,12 @@ pub(super) fn distance_to_circle(off: f64, z: f64, radius: f64) -> f64 {
     let outside = off - radius;
     (outside * outside + z * z).sqrt()
 }
+
+/// Returns the first of s, s + period, … between `low` and `high` that is not before `ahead`, or else the
+/// last of them in the range.
+pub(super) fn select_passage(s: f64, period: f64, low: f64, high: f64, ahead: f64) -> Option<f64> {
+    let first_from = |bound: f64| s + ((bound - s) / period).ceil().max(0.0) * period;
+    let next = first_from(low.max(ahead));
+    let index = if next <= high { next } else { s + ((high - s) / period).floor() * period };
+    (low..=high).contains(&index).then_some(index)
+}

@@ -8,7 +8,9 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::path_shape::{Scratch, TipCurve, circle_coordinates, distance_to_circle, line_parameter, pose};
+use super::path_shape::{
+    Scratch, TipCurve, circle_coordinates, distance_to_circle, line_parameter, pose, select_passage,
+};
 use super::tool_angle::{ToolAngles, tool_angle};
 use crate::kinematics::ToolPose;
 use crate::path::Path;
@@ -161,13 +163,7 @@ impl PathTracker {
             return last.nearest;
         }
         let before = (self.furthest, self.block, self.s);
-        let from = (self.furthest - SEARCH_BACK).max(0.0);
-        let window = SearchWindow { from: self.path.locate(from), to: self.path.locate(until) };
-        let best = self.search(pose, window);
-        if best.s.is_finite() {
-            self.furthest = self.furthest.max(best.progress);
-            (self.block, self.s) = (best.block, best.s);
-        }
+        let best = self.find(pose, until);
         let axis = self.shapes[best.block].axis(&self.path, best.block, best.s, &mut self.scratch);
         let nearest = NearestPoint {
             progress: best.progress,
@@ -180,6 +176,19 @@ impl PathTracker {
         let stays = before == (self.furthest, self.block, self.s);
         self.last = stays.then_some(CachedQuery { pose: *pose, until, nearest });
         nearest
+    }
+
+    /// Returns the nearest point of [`nearest`](Self::nearest) and advances to it.
+    fn find(&mut self, pose: &ToolPose, until: f64) -> Candidate {
+        let until = until.clamp(0.0, self.path.length()).max(self.furthest);
+        let from = (self.furthest - SEARCH_BACK).max(0.0);
+        let window = SearchWindow { from: self.path.locate(from), to: self.path.locate(until) };
+        let best = self.search(pose, window);
+        if best.s.is_finite() {
+            self.furthest = self.furthest.max(best.progress);
+            (self.block, self.s) = (best.block, best.s);
+        }
+        best
     }
 
     /// Returns [`NearestPoint::within_ends`] for a nearest point at `progress` with the vector `error` to the tip, m, of
@@ -387,13 +396,4 @@ impl PathTracker {
         };
         self.candidate(block, s, point, (pose.tip - point).norm())
     }
-}
-
-/// Returns the first of s, s + period, … between `low` and `high` that is not before `ahead`, or else the
-/// last of them in the range.
-fn select_passage(s: f64, period: f64, low: f64, high: f64, ahead: f64) -> Option<f64> {
-    let first_from = |bound: f64| s + ((bound - s) / period).ceil().max(0.0) * period;
-    let next = first_from(low.max(ahead));
-    let index = if next <= high { next } else { s + ((high - s) / period).floor() * period };
-    (low..=high).contains(&index).then_some(index)
 }

@@ -47,7 +47,7 @@ impl PathTracker {
         let shapes = Arc::clone(&self.shapes);
         let TipCurve::Sampled { cells: Some(cells), .. } = &shapes[self.block] else { return None };
         self.find_feet(cells, poses, found)?;
-        let feet = &self.feet.first;
+        let feet = &self.feet.along;
         let extreme =
             |pick: fn(f64, f64) -> f64, start: f64, values: &[f64]| values.iter().copied().fold(start, pick);
         let range = FeetRange {
@@ -61,10 +61,10 @@ impl PathTracker {
         found.within_ends.copy_from_slice(&found.distance);
         self.angles.write_angles(&mut found.orientation);
         let start = self.path.start_of(self.block);
-        let (s, pose) = (self.feet.first[0], poses.get(0));
+        let (s, pose) = (self.feet.along[0], poses.get(0));
         let axis = shapes[self.block].axis(&self.path, self.block, s, &mut self.scratch);
         self.furthest = self.furthest.max(start + range.last);
-        self.s = self.feet.first[poses.len() - 1];
+        self.s = self.feet.along[poses.len() - 1];
         self.last = None;
         Some(NearestPoint {
             progress: start + s,
@@ -83,7 +83,7 @@ impl PathTracker {
         self.angles.resize(count);
         let (point, tangent, _) = cells.tip_derivatives(self.s);
         let slope = tangent / tangent.norm_squared();
-        let FootBuffers { first: feet, second: guesses, .. } = &mut self.feet;
+        let FootBuffers { along: feet, guesses, .. } = &mut self.feet;
         feet.resize(count);
         guesses.resize(count);
         feet.fill(f64::NAN);

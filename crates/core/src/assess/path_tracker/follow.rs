@@ -13,12 +13,12 @@ use crate::assess::path_shape::{TipCurve, circle_coordinates, distance_to_circle
 use crate::kinematics::Poses;
 use crate::simd::{AlignedBuffer, LANES, SliceOperation, vectorize};
 
-/// Distance from the ends of the search range that all foot points keep, m: more than rounding.
+/// Arc length by which a search range is shorter than a turn, m: more than rounding.
 const CLEARANCE: f64 = 1e-9;
 /// Bound of rounding in an arc length or an angle, relative to the largest value in its computation.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
-/// Smallest angle between consecutive foot points on a circle that counts as forward, rad.
-const MIN_ADVANCE: f64 = 1e-9;
+/// Largest tangent of the angle between the first foot point on a circle and another one.
+const MAX_TANGENT: f64 = 1.0;
 
 /// Deviations of consecutive poses from a path.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -124,12 +124,16 @@ impl PathTracker {
             return Some(FollowResult { first, closed_form: true });
         }
         let range = if last > 1 { self.range(before, [begin, until(last)]) } else { None };
-        let closed_form = poses.constant_axis().and(range).is_some_and(|range| {
+        let furthest = poses.constant_axis().and(range).and_then(|range| {
             self.follow_line(poses, range, &mut found.distance)
-                || self.follow_circle(poses, range, &mut found.distance)
+                .or_else(|| self.follow_circle(poses, range, &mut found.distance))
         });
-        if closed_form {
-            self.nearest(&poses.get(last), until(last));
+        if let Some(furthest) = furthest {
+            if furthest != 0 && furthest != last {
+                self.find(&poses.get(furthest), until(furthest));
+            }
+            self.find(&poses.get(last), until(last));
+            self.last = None;
             found.within_ends.extend_from_slice(&found.distance[1..]);
             // The tool axis and that of the path are constant.
             found.orientation.resize(poses.len(), first.orientation);
@@ -141,7 +145,7 @@ impl PathTracker {
                 found.push(&nearest);
             }
         }
-        Some(FollowResult { first, closed_form })
+        Some(FollowResult { first, closed_form: furthest.is_some() })
     }
 
     /// Returns true if all of `poses` lie beyond the path's last point, which is nearest to the first of
@@ -194,96 +198,115 @@ impl PathTracker {
         })
     }
 
-    /// Computes the distances of all poses from a line; returns true if all foot points lie within the
-    /// search range. Updates the furthest point with all poses but the last.
-    fn follow_line(&mut self, poses: &Poses, range: SearchRange, distances: &mut Vec<f64>) -> bool {
-        let TipCurve::Segment { from, slope, .. } = &self.shapes[range.block] else { return false };
+    /// Computes the distances of all poses from a line; returns the index of the furthest foot point if all of them lie
+    /// within the search range.
+    fn follow_line(&mut self, poses: &Poses, range: SearchRange, distances: &mut Vec<f64>) -> Option<usize> {
+        let TipCurve::Segment { from, slope, .. } = &self.shapes[range.block] else { return None };
         let (from, slope) = (*from, *slope);
         vectorize(LineFeet { poses, from, slope, buffers: &mut self.feet });
-        let feet = &self.feet.first[..poses.len()];
-        // The comparison treats NaN as outside.
-        let inside =
-            feet.iter().fold(true, |inside, s| inside & (*s > CLEARANCE && *s < range.high[0] - CLEARANCE));
-        let least = feet.iter().fold(f64::INFINITY, |least, s| if *s < least { *s } else { least });
-        let most = |feet: &[f64]| feet.iter().fold(0.0, |most, s| if *s > most { *s } else { most });
-        let (furthest, before) = (most(feet), most(&feet[..poses.len() - 1]));
-        let low = (self.furthest.max(range.start + furthest) - SEARCH_BACK - range.start).max(range.low);
-        let inside = inside && least > low + CLEARANCE && self.is_within_ends(range, least, furthest);
-        if inside {
-            let progress = (range.start + before).min(self.path.start_of(range.block + 1));
-            self.furthest = self.furthest.max(progress);
-            self.last = None;
-            self.feet.write_distances(distances);
-        }
-        inside
+        let feet = FeetRange::of(&self.feet.along[..poses.len()])?;
+        self.closed_form(range, feet, from.amax(), distances)
     }
 
-    /// Computes the distances of all poses from a circle; returns true if each foot point lies clearly
-    /// ahead of the one before, and all lie within the search range.
+    /// Computes the distances of all poses from a circle; returns the index of the furthest foot point if all of them lie
+    /// within the search range.
     ///
-    /// The first foot point lies within the range. The range starts a fixed length before the furthest foot
-    /// point so far, and its end advances with each pose. Foot points in forward order are never before its
-    /// start, and none is beyond its end if the last one is not beyond the end for the first pose. The
-    /// range is less than one turn, so each pose has a single foot point.
-    fn follow_circle(&mut self, poses: &Poses, range: SearchRange, distances: &mut Vec<f64>) -> bool {
+    /// The range is less than one turn, so each pose has a single foot point in it.
+    fn follow_circle(
+        &mut self,
+        poses: &Poses,
+        range: SearchRange,
+        distances: &mut Vec<f64>,
+    ) -> Option<usize> {
         let TipCurve::Circle { center, plane, radius, turn, .. } = &self.shapes[range.block] else {
-            return false;
+            return None;
         };
         let (center, plane, radius, turn) = (*center, *plane, *radius, *turn);
-        let first = self.s;
-        let one_turn = range.high[1] - range.low < TAU / turn.abs() - CLEARANCE;
-        if !(one_turn && first > range.low + CLEARANCE && first < range.high[0] - CLEARANCE) {
-            return false;
+        if range.high[1] - range.low >= TAU / turn.abs() - CLEARANCE {
+            return None;
         }
-        let (least, direction) = (MIN_ADVANCE * radius * radius, turn.signum());
-        let buffers = &mut self.feet;
-        if !vectorize(CircleFeet { poses, center, plane, radius, least, direction, buffers }) {
-            return false;
+        let direction = turn.signum();
+        vectorize(CircleFeet { poses, center, plane, radius, direction, buffers: &mut self.feet });
+        let tangents = FeetRange::of(&self.feet.along[..poses.len()])?;
+        if tangents.first < -MAX_TANGENT || tangents.last > MAX_TANGENT {
+            return None;
         }
-        self.feet.write_distances(distances);
-        let (xs, ys) = (&self.feet.first, &self.feet.second);
-        let (x0, y0, x, y) = (xs[0], ys[0], xs[poses.len() - 1], ys[poses.len() - 1]);
-        let swept = ((x0 * y - y0 * x) * direction).atan2(x0 * x + y0 * y);
-        let end = first + swept / turn.abs();
-        end < range.high[0] - CLEARANCE && self.is_within_ends(range, first, end)
+        // An angle is not larger than its tangent.
+        let feet = FeetRange {
+            first: self.s + tangents.first / turn.abs(),
+            last: self.s + tangents.last / turn.abs(),
+            ..tangents
+        };
+        self.closed_form(range, feet, (TAU + center.amax() / radius) / turn.abs(), distances)
     }
 
-    /// Returns true if the range between two arc lengths of a block lies between the ends of the block and
-    /// of the path.
-    fn is_within_ends(&self, range: SearchRange, least: f64, most: f64) -> bool {
+    /// Writes the distances of all poses if their foot points `feet` lie clearly within the search range of each pose and
+    /// between the ends of block and path; returns the index of the furthest one.
+    ///
+    /// `scale` is the largest value in the computation of an arc length.
+    fn closed_form(
+        &self,
+        range: SearchRange,
+        feet: FeetRange,
+        scale: f64,
+        distances: &mut Vec<f64>,
+    ) -> Option<usize> {
+        let margin = ROUNDING * (self.path.length() + scale);
         let length = self.path.blocks()[range.block].length();
-        least > CLEARANCE
-            && most < length - CLEARANCE
-            && range.start + least > 0.0
-            && range.start + most + CLEARANCE < self.path.length()
+        let low = (self.furthest.max(range.start + feet.last) - SEARCH_BACK - range.start).max(range.low);
+        let is_inside = feet.first > low.max(0.0) + margin
+            && feet.last < range.high[0].min(length) - margin
+            && range.start + feet.first > 0.0
+            && range.start + feet.last + margin < self.path.length();
+        if is_inside {
+            distances.clear();
+            distances.extend_from_slice(&self.feet.distances);
+        }
+        is_inside.then_some(feet.furthest)
+    }
+}
+
+/// Extreme foot points of poses, arc length, and the index of the last one along the path.
+#[derive(Debug, Clone, Copy)]
+struct FeetRange {
+    first: f64,
+    last: f64,
+    furthest: usize,
+}
+
+impl FeetRange {
+    /// Returns the range of foot points; `None` if one is NaN.
+    fn of(feet: &[f64]) -> Option<Self> {
+        if feet.iter().fold(false, |is_nan, s| is_nan | s.is_nan()) {
+            return None;
+        }
+        let first = feet.iter().fold(f64::INFINITY, |first, s| if *s < first { *s } else { first });
+        let last = feet.iter().fold(f64::NEG_INFINITY, |last, s| if *s > last { *s } else { last });
+        // Mostly the axes move forward.
+        let furthest = feet.iter().rposition(|s| *s == last)?;
+        Some(FeetRange { first, last, furthest })
     }
 }
 
 /// Buffers for the foot points of consecutive poses.
 #[derive(Debug, Clone, Default)]
 pub(super) struct FootBuffers {
-    /// Arc length of the foot point on a line or another curve, or first coordinate of the pose in the plane of a circle, m.
-    pub first: AlignedBuffer,
-    /// Second coordinate of the pose, m, or estimate of the arc length on another curve.
-    pub second: AlignedBuffer,
+    /// Arc length of the foot point, or tangent of its angle from the first one on a circle.
+    pub along: AlignedBuffer,
+    /// Estimate of the arc length of the foot point.
+    pub guesses: AlignedBuffer,
     /// Distance from the curve, m.
     distances: AlignedBuffer,
 }
 
 impl FootBuffers {
-    /// Sets the number of poses and returns the buffers in vectors.
+    /// Sets the number of poses; returns the places of foot points and distances in vectors.
     #[inline(always)]
-    fn lanes(&mut self, count: usize) -> [&mut [[f64; LANES]]; 3] {
-        [&mut self.first, &mut self.second, &mut self.distances].map(|buffer| {
+    fn lanes(&mut self, count: usize) -> [&mut [[f64; LANES]]; 2] {
+        [&mut self.along, &mut self.distances].map(|buffer| {
             buffer.resize(count);
             &mut buffer.lanes_mut()[..count.div_ceil(LANES)]
         })
-    }
-
-    /// Replaces the contents of `distances` by those of the poses.
-    fn write_distances(&self, distances: &mut Vec<f64>) {
-        distances.clear();
-        distances.extend_from_slice(&self.distances);
     }
 }
 
@@ -301,7 +324,7 @@ impl SliceOperation for LineFeet<'_> {
     #[inline(always)]
     fn run(self) {
         let LineFeet { poses, from, slope, buffers } = self;
-        let [feet, _, distances] = buffers.lanes(poses.len());
+        let [feet, distances] = buffers.lanes(poses.len());
         let [xs, ys, zs] = poses.tip_lanes();
         let tips = xs.iter().zip(ys).zip(zs);
         for ((foot, distance), ((x, y), z)) in feet.iter_mut().zip(distances).zip(tips) {
@@ -317,47 +340,38 @@ impl SliceOperation for LineFeet<'_> {
     }
 }
 
-/// Computation of the coordinates of poses in the plane of a circle.
+/// Computation of the foot points of poses on a circle.
 struct CircleFeet<'a> {
     poses: &'a Poses,
     center: Vector3<f64>,
     plane: [Vector3<f64>; 3],
     radius: f64,
-    /// Smallest product of the radii of consecutive foot points that counts as forward, m².
-    least: f64,
     /// Sign of the direction of rotation.
     direction: f64,
     buffers: &'a mut FootBuffers,
 }
 
 impl SliceOperation for CircleFeet<'_> {
-    type Output = bool;
+    type Output = ();
 
-    /// Returns true if each foot point lies clearly ahead of the one before, less than a quarter turn from the first.
+    /// Writes the tangents of the angles from the first foot point, NaN beyond a quarter turn, and the distances.
     #[inline(always)]
-    fn run(self) -> bool {
-        let CircleFeet { poses, center, plane, radius, least, direction, buffers } = self;
-        let [us, vs, distances] = buffers.lanes(poses.len());
+    fn run(self) {
+        let CircleFeet { poses, center, plane, radius, direction, buffers } = self;
+        let [tangents, distances] = buffers.lanes(poses.len());
+        let ([u0, v0, _], _) = circle_coordinates(poses.tip(0), center, &plane);
         let [xs, ys, zs] = poses.tip_lanes();
-        let outputs = us.iter_mut().zip(vs).zip(distances);
-        for (((u, v), distance), ((x, y), z)) in outputs.zip(xs.iter().zip(ys).zip(zs)) {
-            let (x, y, z) = (*x, *y, *z);
-            let mut values = [[0.0; LANES]; 3];
+        let tips = xs.iter().zip(ys).zip(zs);
+        for ((tangent, distance), ((x, y), z)) in tangents.iter_mut().zip(distances).zip(tips) {
+            let (x, y, z, mut ratio, mut length) = (*x, *y, *z, [0.0; LANES], [0.0; LANES]);
             for k in 0..LANES {
                 let tip = Vector3::new(x[k], y[k], z[k]);
-                let ([first, second, off_plane], off) = circle_coordinates(tip, center, &plane);
-                (values[0][k], values[1][k]) = (first, second);
-                values[2][k] = distance_to_circle(off, off_plane, radius);
+                let ([u, v, off_plane], off) = circle_coordinates(tip, center, &plane);
+                let (sine, cosine) = ((u0 * v - v0 * u) * direction, u0 * u + v0 * v);
+                ratio[k] = if cosine > 0.0 { sine / cosine } else { f64::NAN };
+                length[k] = distance_to_circle(off, off_plane, radius);
             }
-            [*u, *v, *distance] = values;
+            (*tangent, *distance) = (ratio, length);
         }
-        let (us, vs) = (&buffers.first[..], &buffers.second[..]);
-        let (u0, v0) = (us[0], vs[0]);
-        let steps = us.iter().zip(vs).zip(us[1..].iter().zip(&vs[1..]));
-        // The comparison treats NaN as not ahead.
-        steps.fold(true, |ahead, ((u_before, v_before), (u, v))| {
-            let forwards = (u_before * v - v_before * u) * direction > least;
-            ahead & forwards & (u0 * u + v0 * v > 0.0)
-        })
     }
 }
