@@ -277,6 +277,7 @@ pub struct LimitsConfig {
 
 impl LimitsConfig {
     /// Returns true if `position` (m or rad) is more than 1 mm or 1 mrad outside the travel limits.
+    #[inline]
     pub fn is_outside_travel(&self, position: f64) -> bool {
         !(self.travel_min - OVERSHOOT_TOLERANCE..=self.travel_max + OVERSHOOT_TOLERANCE).contains(&position)
     }

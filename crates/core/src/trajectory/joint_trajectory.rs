@@ -144,7 +144,9 @@ impl Trajectory {
     /// Returns the index of the last point at or before `time` if the points after `hint` are equidistant.
     fn equidistant_index(&self, time: Nanoseconds, hint: usize) -> Option<usize> {
         let (from, to) = (*self.times.get(hint)?, *self.times.get(hint + 1)?);
-        Some(hint + usize::try_from(time.checked_sub(from)? / (to - from)).ok()?)
+        // A division of floats takes less time than one of integers, and is exact below 104 days.
+        let steps = time.checked_sub(from)? as f64 / (to - from) as f64;
+        Some(hint.saturating_add(steps as usize))
     }
 
     /// Returns the state of `column` at local `time`, clamped to the first and last point.

@@ -132,7 +132,9 @@ impl JointPlan {
     /// Returns true if the last setpoint is commanded at or before `instant`.
     pub fn has_ended(&self, instant: PlanInstant, period: Nanoseconds) -> bool {
         match &self.kind {
-            PlanKind::Trajectory(_) | PlanKind::Chunk(_) => instant.path.instant(period) >= self.end_k,
+            PlanKind::Trajectory(_) | PlanKind::Chunk(_) => {
+                instant.path.ns >= self.end_k.saturating_mul(period)
+            }
             _ => instant.k >= self.end_k,
         }
     }

@@ -277,14 +277,28 @@ struct FeetRange {
 impl FeetRange {
     /// Returns the range of foot points; `None` if one is NaN.
     fn of(feet: &[f64]) -> Option<Self> {
-        if feet.iter().fold(false, |is_nan, s| is_nan | s.is_nan()) {
-            return None;
-        }
-        let first = feet.iter().fold(f64::INFINITY, |first, s| if *s < first { *s } else { first });
-        let last = feet.iter().fold(f64::NEG_INFINITY, |last, s| if *s > last { *s } else { last });
+        let [first, last] = vectorize(Extremes(feet))?;
         // Mostly the axes move forward.
         let furthest = feet.iter().rposition(|s| *s == last)?;
         Some(FeetRange { first, last, furthest })
+    }
+}
+
+/// Search of the least and the largest of values, none of which is NaN.
+struct Extremes<'a>(&'a [f64]);
+
+impl SliceOperation for Extremes<'_> {
+    type Output = Option<[f64; 2]>;
+
+    #[inline(always)]
+    fn run(self) -> Option<[f64; 2]> {
+        let [mut least, mut largest, mut is_nan] = [f64::INFINITY, f64::NEG_INFINITY, 0.0];
+        for &value in self.0 {
+            least = if value < least { value } else { least };
+            largest = if value > largest { value } else { largest };
+            is_nan = if value.is_nan() { 1.0 } else { is_nan };
+        }
+        (is_nan == 0.0).then_some([least, largest])
     }
 }
 
