@@ -42,6 +42,9 @@ impl BacklashOffset {
         if change != 0.0 {
             self.direction = change.signum();
         }
+        if compensation.half_width == 0.0 && self.angle == 0.0 {
+            return;
+        }
         let wanted = self.direction * compensation.half_width;
         let (low, high) = (self.angle - compensation.max_change, self.angle + compensation.max_change);
         self.angle = wanted.max(low).min(high);

@@ -190,6 +190,14 @@ impl SetpointHistory {
         self.ring[self.ring_index(k)]
     }
 
+    /// Returns the setpoints up to PSEC_k, N of them.
+    #[inline]
+    fn last<const N: usize>(&self, k: i64) -> [f64; N] {
+        let mut setpoints = [0.0; N];
+        setpoints.copy_from_slice(self.slice(k - (N as i64 - 1), N));
+        setpoints
+    }
+
     /// Returns `count` consecutive setpoints from PSEC_k on, at most as many as the window contains.
     #[inline]
     pub fn slice(&self, k: i64, count: usize) -> &[f64] {
@@ -218,16 +226,18 @@ impl Feedforward {
         }
     }
 
-    /// Returns VFFWS of setpoint k, rad/s of the motor.
+    /// Returns VFFWS of setpoints k − 1 and k, rad/s of the motor.
     #[inline]
-    pub fn velocity(&self, psec: &SetpointHistory, k: i64) -> f64 {
-        self.velocity * (psec.at(k) - psec.at(k - 1))
+    pub fn velocities(&self, psec: &SetpointHistory, k: i64) -> [f64; 2] {
+        let [a, b, c] = psec.last(k);
+        [b - a, c - b].map(|change| self.velocity * change)
     }
 
-    /// Returns TFFWS of setpoint k, N·m at the motor.
+    /// Returns TFFWS of setpoints k − 1 and k, N·m at the motor.
     #[inline]
-    pub fn torque(&self, psec: &SetpointHistory, k: i64) -> f64 {
-        self.torque * ((psec.at(k) - psec.at(k - 1)) - (psec.at(k - 1) - psec.at(k - 2)))
+    pub fn torques(&self, psec: &SetpointHistory, k: i64) -> [f64; 2] {
+        let [a, b, c, d] = psec.last(k);
+        [(c - b) - (b - a), (d - c) - (c - b)].map(|difference| self.torque * difference)
     }
 }
 
@@ -267,7 +277,7 @@ mod tests {
         h.push(5.0);
         assert_eq!(h.at(-1), 5.0);
         let f = Feedforward { velocity: 1.0, torque: 1.0 };
-        assert_eq!((f.velocity(&h, 0), f.torque(&h, 0)), (0.0, 0.0));
+        assert_eq!((f.velocities(&h, 0), f.torques(&h, 0)), ([0.0; 2], [0.0; 2]));
     }
 
     #[test]

@@ -23,8 +23,10 @@ pub struct Poses {
 
 /// Returns true if all values are bit-identical.
 fn are_equal(values: &[f64]) -> bool {
+    let (Some(first), Some(last)) = (values.first(), values.last()) else { return true };
     // Without an early end the comparison is a series of vector instructions.
-    values.iter().fold(0, |differences, value| differences | (value.to_bits() ^ values[0].to_bits())) == 0
+    first.to_bits() == last.to_bits()
+        && values.iter().fold(0, |differences, value| differences | (value.to_bits() ^ first.to_bits())) == 0
 }
 
 impl Poses {

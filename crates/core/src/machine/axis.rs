@@ -74,10 +74,11 @@ impl FeedforwardDelay {
         FeedforwardDelay { delay, switch: delay.switch_tick().div_ceil(periods.ticks_per_velocity()) as f64 }
     }
 
-    /// Returns the feedforward over position cycle `k`; `value` returns that of a setpoint.
-    fn hold(&self, k: i64, value: impl Fn(i64) -> f64) -> ZeroOrderHold {
-        let after = self.delay.index_after_switch(k);
-        ZeroOrderHold { before: value(after - 1), after: value(after), step: self.switch }
+    /// Returns the feedforward over position cycle `k`; `values` returns those of a setpoint and of the one before.
+    #[inline]
+    fn hold(&self, k: i64, values: impl Fn(i64) -> [f64; 2]) -> ZeroOrderHold {
+        let [before, after] = values(self.delay.index_after_switch(k));
+        ZeroOrderHold { before, after, step: self.switch }
     }
 }
 
@@ -249,8 +250,7 @@ impl Axis {
     ) {
         // TFFWS at the last tick of the position cycle.
         let torque = |p: &AxisParameters| {
-            p.feedforward
-                .torque(&self.psec, p.torque_delay.delay.index_after_switch(self.psec.present_index()))
+            p.torque_delay.hold(self.psec.present_index(), |k| p.feedforward.torques(&self.psec, k)).after
         };
         let limit = p.torque_constant * p.max_current;
         state.velocity.integral += (torque(old) - torque(p)).clamp(-limit, limit);
@@ -345,8 +345,8 @@ impl Axis {
         if feedback.max_current_excess > 0.0 {
             self.position.record_saturated(feedback.speed);
         }
-        let velocity = p.velocity_delay.hold(present, |k| p.feedforward.velocity(history, k));
-        let torque = p.torque_delay.hold(present, |k| p.feedforward.torque(history, k));
+        let velocity = p.velocity_delay.hold(present, |k| p.feedforward.velocities(history, k));
+        let torque = p.torque_delay.hold(present, |k| p.feedforward.torques(history, k));
         let velocity_feedforward = velocity.at(0.0);
         let setpoint = |j| history.at(k + j) * p.inverse_ratio;
         self.backlash_offset.update(&p.backlash_compensation, setpoint(0) - setpoint(-1));

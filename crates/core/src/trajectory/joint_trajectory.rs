@@ -161,10 +161,9 @@ impl Trajectory {
         self.segment(column, index).state_at(time.since(self.times[index]))
     }
 
-    /// Returns the position of [`state_near`](Self::state_near).
+    /// Returns the position of [`state_near`](Self::state_near); `index` is the last point at or before `time`.
     #[inline]
-    pub(super) fn position_near(&self, column: usize, time: PathTime, hint: usize) -> f64 {
-        let index = self.locate(time.ns, hint);
+    pub(super) fn position_after(&self, column: usize, time: PathTime, index: usize) -> f64 {
         if index >= self.segments() || time.since(self.times[index]) <= 0.0 {
             return self.positions[index * self.joints.len() + column];
         }
@@ -174,7 +173,8 @@ impl Trajectory {
     /// Returns the position of `column` at local `time`, ns, clamped to the first and last point; `None`
     /// for a stop or an unknown column.
     pub fn position(&self, column: usize, time: Nanoseconds) -> Option<f64> {
-        (!self.is_stop() && column < self.joints.len()).then(|| self.position_near(column, time.into(), 0))
+        (!self.is_stop() && column < self.joints.len())
+            .then(|| self.position_after(column, time.into(), self.locate(time, 0)))
     }
 
     fn plan_final_stops(&mut self, machine: &[JointLimits]) {

@@ -131,11 +131,12 @@ impl PlannedMotion for QueuedMotion<'_> {
         {
             column.chunk.positions(column.local_time(path, self.period), joints);
         }
+        let mut near = None;
         for (queue, position) in self.queues.iter().zip(joints) {
             match queue.plan_at(path_k) {
                 Some(JointPlan { kind: PlanKind::Chunk(_), .. }) => {}
                 Some(plan) if plan.is_trajectory() => {
-                    *position = plan.position(PlanInstant { k: i64::MAX, path }, self.period);
+                    *position = plan.position(PlanInstant { k: i64::MAX, path }, self.period, &mut near);
                 }
                 // Stops and streams do not follow the path time.
                 _ => *position = queue.state.position,
@@ -241,6 +242,7 @@ impl Timeline {
             path: self.clock.ahead(cycles, self.period),
         };
         let path_k = instant.path.instant(self.period);
+        let mut near = None;
         let queues = self.queues.iter().enumerate().skip(*joints.start());
         for (joint, queue) in queues.take_while(|(joint, _)| joint <= joints.end()) {
             let position = match queue.plan_at(path_k) {
@@ -249,7 +251,7 @@ impl Timeline {
                     let cycles = instant.k - self.next_k;
                     self.stream.state_after(joint, cycles, *newest, queue.state.position).position
                 }
-                Some(plan) => plan.position(instant, self.period),
+                Some(plan) => plan.position(instant, self.period, &mut near),
                 None => queue.state.position,
             };
             visit(joint, position);

@@ -70,13 +70,16 @@ impl TrajectoryColumn {
         }
     }
 
-    /// Returns the position at local `time`, m or rad.
+    /// Returns the position at local `time`, m or rad. `near` is the last index found at this time for another joint, or
+    /// `None`, and is replaced.
     #[inline]
-    pub fn position(&self, time: PathTime) -> f64 {
+    pub fn position(&self, time: PathTime, near: &mut Option<usize>) -> f64 {
         let trajectory = &self.trajectory;
         let is_on_points = self.approach.is_none() || time.ns >= trajectory.first_time();
         if is_on_points && (time.ns < trajectory.duration() || trajectory.final_stop(self.column).is_none()) {
-            return trajectory.position_near(self.column, time, self.cursor);
+            let index = trajectory.locate(time.ns, near.unwrap_or(self.cursor));
+            *near = Some(index);
+            return trajectory.position_after(self.column, time, index);
         }
         self.state(time).position
     }
@@ -106,11 +109,12 @@ impl JointPlan {
         }
     }
 
-    /// Returns the position at `instant`, at the earliest `join_k`, m or rad.
+    /// Returns the position at `instant`, at the earliest `join_k`, m or rad. `near` is that of
+    /// [`TrajectoryColumn::position`]: the joints of a trajectory have the same points.
     #[inline]
-    pub fn position(&self, instant: PlanInstant, period: Nanoseconds) -> f64 {
+    pub fn position(&self, instant: PlanInstant, period: Nanoseconds, near: &mut Option<usize>) -> f64 {
         match &self.kind {
-            PlanKind::Trajectory(path) => path.position(path.local_time(instant.path, period)),
+            PlanKind::Trajectory(path) => path.position(path.local_time(instant.path, period), near),
             _ => self.state(instant, period).position,
         }
     }
