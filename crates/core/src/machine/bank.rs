@@ -99,6 +99,11 @@ impl AxisBank {
         AxisBank { blocks, ticks, width: SimdWidth::default() }
     }
 
+    /// Returns the ticks of the control loops.
+    pub fn ticks(&self) -> CycleTicks {
+        self.ticks
+    }
+
     /// Sets the SIMD width of the following position cycles.
     pub fn set_simd_width(&mut self, width: SimdWidth) {
         self.width = width;

@@ -264,9 +264,9 @@ impl Machine {
             return self.advance_ticks(self.ticks_per_period(), psec, preview);
         }
         self.execute_position_loops(psec, preview);
-        self.run(TickSpan::whole(self.parameters.cycle_ticks(), false));
+        self.run(TickSpan::whole(self.bank.ticks(), false));
         self.update_samples(0);
-        self.tick += self.parameters.periods.ticks_per_position();
+        self.tick += self.bank.ticks().position as u64;
     }
 
     /// Advances by one position cycle like [`advance`](Self::advance) and calls `observe` at each tick.
@@ -275,8 +275,8 @@ impl Machine {
     /// of the tick. Afterwards they are those at the start of the position cycle.
     pub fn advance_with(&mut self, psec: &[f64], preview: &[f64], mut observe: impl FnMut(&Machine)) {
         self.execute_position_loops(psec, preview);
-        self.run(TickSpan::whole(self.parameters.cycle_ticks(), true));
-        for tick in 0..self.parameters.periods.ticks_per_position() {
+        self.run(TickSpan::whole(self.bank.ticks(), true));
+        for tick in 0..self.bank.ticks().position as u64 {
             self.update_samples(tick as usize);
             observe(self);
             self.tick += 1;
@@ -354,12 +354,12 @@ impl Machine {
 
     /// Returns true between two position cycles, false within one.
     pub fn is_at_cycle_start(&self) -> bool {
-        self.tick.is_multiple_of(self.parameters.periods.ticks_per_position())
+        self.tick.is_multiple_of(self.bank.ticks().position as u64)
     }
 
     /// Returns the number of ticks per position cycle.
     pub fn ticks_per_period(&self) -> usize {
-        self.parameters.cycle_ticks().position
+        self.bank.ticks().position
     }
 
     /// Sets the samples of all axes to a tick of the last position cycle.

@@ -229,9 +229,20 @@ pub fn simulate(
     let mut filters = experiment
         .trace_filter
         .map(|cutoff| [*first, 0.0, 0.0].map(|start| LowPassFilter::new(cutoff, tick, start)));
+    // Without a filter or a mean, only the ticks on either side of a sample are read.
+    let needs_all = is_mean || filters.is_some();
+    let ticks = machine.ticks_per_period();
     for psec in &experiment.psec {
         machine.advance(&[*psec], &[]);
-        for tick in 0..machine.ticks_per_period() {
+        for tick in 0..ticks {
+            let is_due = next < count && due <= now as f64 + 1e-6;
+            if !needs_all && !is_due {
+                now += 1;
+                continue;
+            }
+            if !needs_all && tick > 0 {
+                before = machine.motion_at(0, tick - 1);
+            }
             let mut here = machine.motion_at(0, tick);
             if let Some(filters) = &mut filters {
                 for (value, filter) in here.iter_mut().zip(filters) {
@@ -252,6 +263,9 @@ pub fn simulate(
             }
             before = here;
             now += 1;
+        }
+        if !needs_all && ticks > 0 {
+            before = machine.motion_at(0, ticks - 1);
         }
     }
     if is_mean {
