@@ -125,7 +125,8 @@ fn control(criterion: &mut Criterion) {
         for k in 0..MANY {
             history.push(swing(0, k));
             let k = history.present_index() - 2;
-            sum += history.at(k) + feedforward.velocity(&history, k) + feedforward.torque(&history, k);
+            sum +=
+                history.at(k) + feedforward.velocities(&history, k)[1] + feedforward.torques(&history, k)[1];
         }
         sum
     });

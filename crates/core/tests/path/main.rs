@@ -1,6 +1,7 @@
 //! Tests of paths, kinematics, scenarios and motion assessment.
 
 mod circularity;
+mod closed_form;
 mod kinematics;
 mod path_blocks;
 mod path_common;
