@@ -4,8 +4,9 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use crate::path_common::*;
+use proptest::prelude::*;
 use virtual_axes_core::assess::{PathDeviations, PathTracker};
-use virtual_axes_core::kinematics::{Poses, TableAngles};
+use virtual_axes_core::kinematics::{Kinematics, Poses, TableAngles};
 use virtual_axes_core::path::{Block, Frame, Path};
 
 const TICKS: usize = 48;
@@ -27,17 +28,54 @@ fn on_circle(u: f64, deviation: f64) -> [f64; 2] {
     [(RADIUS - deviation) * cosine - RADIUS, (RADIUS - deviation) * sine]
 }
 
+/// Trackers of a path, one for whole position cycles and one for single poses.
+struct Trackers {
+    kinematics: Kinematics,
+    at_once: PathTracker,
+    single: PathTracker,
+    angles: TableAngles,
+    poses: Poses,
+    found: PathDeviations,
+}
+
+impl Trackers {
+    fn new(path: Path) -> Self {
+        let kinematics = path.kinematics().clone();
+        let at_once = PathTracker::new(Arc::new(path));
+        let single = at_once.clone();
+        let (angles, poses, found) = (TableAngles::default(), Poses::default(), PathDeviations::default());
+        Trackers { kinematics, at_once, single, angles, poses, found }
+    }
+
+    /// Follows a position cycle: `joints` contains the values of the first axis at all ticks, then those of the next one,
+    /// and `until` the progress commanded at each tick. Returns true if it was evaluated in closed form; an error
+    /// describes a tick whose deviations differ.
+    fn follow(&mut self, joints: &[f64], until: &[f64]) -> Result<bool, String> {
+        self.kinematics.forward_batch(&mut self.angles, joints, until.len(), &mut self.poses);
+        let followed = self.at_once.follow(&self.poses, |tick| until[tick], &mut self.found).expect("poses");
+        for (tick, until) in until.iter().enumerate() {
+            let wanted = self.single.nearest(&self.poses.get(tick), *until);
+            let found = &self.found;
+            let found = [found.distance[tick], found.within_ends[tick], found.orientation[tick]];
+            let wanted_deviations = [wanted.distance, wanted.within_ends, wanted.orientation];
+            if found.map(f64::to_bits) != wanted_deviations.map(f64::to_bits) {
+                let progress = wanted.progress;
+                return Err(format!(
+                    "tick {tick}, progress {progress}: {found:?} instead of {wanted_deviations:?}"
+                ));
+            }
+        }
+        Ok(followed.closed_form)
+    }
+}
+
 /// Follows a path up to `target`, then `motion` about it, a function of the time in position cycles, and compares each tick
 /// with the search for single poses.
 ///
 /// Returns the share of the cycles of `motion` in closed form.
 fn follow(block: Block, position: Position, target: f64, motion: &dyn Fn(f64) -> f64) -> f64 {
-    let kinematics = kinematics(&[]);
-    let path = Arc::new(Path::new(kinematics.clone(), Frame::Workpiece, vec![block]).expect("a path"));
-    let mut at_once = PathTracker::new(path);
-    let mut single = at_once.clone();
-    let (mut angles, mut poses, mut found) =
-        (TableAngles::default(), Poses::default(), PathDeviations::default());
+    let mut trackers =
+        Trackers::new(Path::new(kinematics(&[]), Frame::Workpiece, vec![block]).expect("a path"));
     let approach = (target / FEED).ceil() as usize;
     let progress = |time: f64| {
         let after = time - approach as f64;
@@ -54,19 +92,8 @@ fn follow(block: Block, position: Position, target: f64, motion: &dyn Fn(f64) ->
             let [x, y] = position(progress(time), 2e-6 * (0.7 * time).sin());
             (joints[tick], joints[TICKS + tick]) = (x, y);
         }
-        kinematics.forward_batch(&mut angles, &joints, TICKS, &mut poses);
-        let followed = at_once.follow(&poses, |tick| until[tick], &mut found).expect("poses");
-        closed_forms += usize::from(cycle >= approach && followed.closed_form);
-        for (tick, until) in until.into_iter().enumerate() {
-            let wanted = single.nearest(&poses.get(tick), until);
-            let found = [found.distance[tick], found.within_ends[tick], found.orientation[tick]];
-            let wanted_deviations = [wanted.distance, wanted.within_ends, wanted.orientation];
-            assert!(
-                found.map(f64::to_bits) == wanted_deviations.map(f64::to_bits),
-                "cycle {cycle}, tick {tick}, progress {}: {found:?} instead of {wanted_deviations:?}",
-                wanted.progress
-            );
-        }
+        let is_closed_form = trackers.follow(&joints, &until).unwrap_or_else(|error| panic!("{error}"));
+        closed_forms += usize::from(cycle >= approach && is_closed_form);
     }
     closed_forms as f64 / cycles as f64
 }
@@ -110,5 +137,126 @@ fn settling_at_the_end_is_evaluated_in_closed_form() {
         }
         let share = follow(straight(), on_line, LENGTH, &motion);
         assert!(share >= 0.9, "{name} on the line: {share}");
+    }
+}
+
+/// Shape of a random block that begins at the end of the block before.
+#[derive(Debug, Clone, Copy)]
+enum Shape {
+    /// Line: direction, rad, and length, m.
+    Line(f64, f64),
+    /// Arc: radius, m, direction of the center, rad, and angle, rad, negative clockwise.
+    Arc(f64, f64, f64),
+}
+
+/// Motion of the axes during a random position cycle.
+#[derive(Debug, Clone)]
+struct Cycle {
+    ticks: usize,
+    /// Change of progress in the cycle, m.
+    step: f64,
+    /// Amplitude, m, of a half wave within the cycle.
+    swing: f64,
+    /// Jump of progress after a part of the cycle, m.
+    jump: Option<(f64, f64)>,
+    /// Progress commanded beyond that of the axes, m.
+    ahead: f64,
+    /// Deviation of X, Y and Z, m.
+    deviation: [f64; 3],
+}
+
+/// Returns a strategy of numbers with either sign whose magnitude is between powers of ten.
+fn signed(exponents: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
+    (exponents, prop::sample::select(vec![-1.0, 1.0]))
+        .prop_map(|(exponent, sign)| sign * 10f64.powf(exponent))
+}
+
+fn shapes() -> impl Strategy<Value = Vec<Shape>> {
+    let line = (-3.2..3.2, 0.001..0.3).prop_map(|(direction, length)| Shape::Line(direction, length));
+    let radius = (-2.5..-0.5).prop_map(|exponent| 10f64.powf(exponent));
+    let turns = prop::sample::select(vec![-2.0 * TAU, -TAU, TAU, 3.0 * TAU]);
+    let angle = prop_oneof![turns, signed(-1.0..1.2)];
+    let arc = (radius, -3.2..3.2, angle).prop_map(|(radius, at, angle)| Shape::Arc(radius, at, angle));
+    prop::collection::vec(prop_oneof![1 => line, 2 => arc], 1..4)
+}
+
+fn cycles() -> impl Strategy<Value = Vec<Cycle>> {
+    let step = prop_oneof![3 => (0.0..2e-3).boxed(), 2 => signed(-13.0..-3.0).boxed()];
+    let swing = prop_oneof![2 => Just(0.0).boxed(), 1 => signed(-12.0..-1.7).boxed()];
+    let jump = prop::option::weighted(0.1, (0.0..1.0, signed(-6.0..-0.5)));
+    let ahead = prop_oneof![2 => Just(6e-3).boxed(), 1 => Just(-1e-3).boxed(), 1 => (0.0..0.5).boxed()];
+    let deviation = [signed(-12.0..-3.0), signed(-12.0..-3.0), signed(-12.0..-5.0)];
+    let cycle = (1_usize..60, step, swing, jump, ahead, deviation).prop_map(
+        |(ticks, step, swing, jump, ahead, deviation)| Cycle { ticks, step, swing, jump, ahead, deviation },
+    );
+    prop::collection::vec(cycle, 1..60)
+}
+
+/// Returns the blocks of a path, one after the other from home.
+fn blocks(shapes: &[Shape]) -> Vec<Block> {
+    let mut at = [0.0; 5];
+    let block = |shape: &Shape| match *shape {
+        Shape::Line(direction, length) => {
+            let (sine, cosine) = direction.sin_cos();
+            let from = at;
+            (at[0], at[1]) = (from[0] + length * cosine, from[1] + length * sine);
+            line(from, at)
+        }
+        Shape::Arc(radius, direction, angle) => {
+            let (sine, cosine) = direction.sin_cos();
+            let (from, center) = (at, [at[0] + radius * cosine, at[1] + radius * sine]);
+            let (sine, cosine) = (direction + angle).sin_cos();
+            (at[0], at[1]) = (center[0] - radius * cosine, center[1] - radius * sine);
+            arc(from, center, angle, at)
+        }
+    };
+    shapes.iter().map(block).collect()
+}
+
+/// Returns the joints at progress `u`, straight on beyond the ends.
+fn joints_at(path: &Path, u: f64) -> [f64; 5] {
+    let (length, step) = (path.length(), 1e-5);
+    let (mut joints, mut inside) = ([0.0; 5], [0.0; 5]);
+    let end = u.clamp(0.0, length);
+    path.joints(end, &mut joints);
+    if u != end {
+        path.joints((end + if u > end { -step } else { step }).clamp(0.0, length), &mut inside);
+        for (joint, inside) in joints.iter_mut().zip(inside) {
+            *joint += (*joint - inside) / step * (u - end).abs();
+        }
+    }
+    joints
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 1500, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn random_motions_have_the_deviations_of_single_poses(
+        shapes in shapes(), cycles in cycles(), begin in 0.0..1.0_f64, is_in_joints: bool
+    ) {
+        let frame = if is_in_joints { Frame::Joints } else { Frame::Workpiece };
+        let path = Path::new(kinematics(&[]), frame, blocks(&shapes)).expect("a path");
+        let length = path.length();
+        let mut trackers = Trackers::new(path.clone());
+        let mut progress = begin * length;
+        let mut commanded = progress;
+        for cycle in cycles {
+            let mut joints = vec![0.0; 5 * cycle.ticks];
+            let mut until = vec![0.0; cycle.ticks];
+            for (tick, until) in until.iter_mut().enumerate() {
+                let part = tick as f64 / cycle.ticks as f64;
+                let jump = cycle.jump.map_or(0.0, |(from, jump)| if part >= from { jump } else { 0.0 });
+                let u = progress + cycle.step * part + cycle.swing * (0.5 * TAU * part).sin() + jump;
+                commanded = commanded.max(u + cycle.ahead);
+                *until = commanded;
+                let mut row = joints_at(&path, u.clamp(-0.01, length + 0.01));
+                row.iter_mut().zip(cycle.deviation).for_each(|(joint, deviation)| *joint += deviation);
+                row.iter().enumerate().for_each(|(axis, value)| joints[axis * cycle.ticks + tick] = *value);
+            }
+            progress = (progress + cycle.step).clamp(-1e-3, length + 1e-3);
+            let followed = trackers.follow(&joints, &until);
+            prop_assert!(followed.is_ok(), "{followed:?}");
+        }
     }
 }

@@ -262,9 +262,19 @@ fn a_series_of_points_has_the_report_of_single_points() {
         };
         let points: Vec<[f64; 2]> = (0..steps).map(at).collect();
         points.iter().for_each(|[x, y]| _ = single.push(*x, *y));
-        for part in points.chunks(48) {
-            let column = |i: usize| part.iter().map(|point| point[i]).collect::<Vec<_>>();
-            series.push_all(&column(0), &column(1));
+        // Series of whole vectors, of other lengths, and single points in between.
+        let mut rest = &points[..];
+        for length in [48, 13, 8, 1].into_iter().cycle() {
+            let (part, after) = rest.split_at(length.min(rest.len()));
+            match part {
+                [] => break,
+                [[x, y]] => _ = series.push(*x, *y),
+                _ => {
+                    let column = |i: usize| part.iter().map(|point| point[i]).collect::<Vec<_>>();
+                    series.push_all(&column(0), &column(1));
+                }
+            }
+            rest = after;
         }
         assert_eq!(series.report(), single.report(), "{turns} turns");
     }

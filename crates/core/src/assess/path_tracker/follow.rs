@@ -2,7 +2,8 @@
 //!
 //! Along a line or a circle, no search is needed for each pose: if the foot points of all poses lie in the
 //! block, within the search range, the distance follows directly from the pose. The computation is the same
-//! as in the search, so the distances are bit-identical.
+//! as in the search, so the distances are bit-identical. On a circle, the furthest of poses that differ by rounding can be
+//! another one than in the search: the start of the search range then differs in the last digit.
 
 use std::f64::consts::TAU;
 
@@ -17,8 +18,6 @@ use crate::simd::{AlignedBuffer, LANES, SliceOperation, vectorize};
 const CLEARANCE: f64 = 1e-9;
 /// Bound of rounding in an arc length or an angle, relative to the largest value in its computation.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
-/// Largest tangent of the angle between the first foot point on a circle and another one.
-const MAX_TANGENT: f64 = 1.0;
 
 /// Deviations of consecutive poses from a path.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -204,7 +203,7 @@ impl PathTracker {
         let TipCurve::Segment { from, slope, .. } = &self.shapes[range.block] else { return None };
         let (from, slope) = (*from, *slope);
         vectorize(LineFeet { poses, from, slope, buffers: &mut self.feet });
-        let feet = FeetRange::of(&self.feet.along[..poses.len()])?;
+        let feet = FootRange::of(&self.feet.along[..poses.len()])?;
         self.closed_form(range, feet, from.amax(), distances)
     }
 
@@ -227,12 +226,9 @@ impl PathTracker {
         }
         let direction = turn.signum();
         vectorize(CircleFeet { poses, center, plane, radius, direction, buffers: &mut self.feet });
-        let tangents = FeetRange::of(&self.feet.along[..poses.len()])?;
-        if tangents.first < -MAX_TANGENT || tangents.last > MAX_TANGENT {
-            return None;
-        }
-        // An angle is not larger than its tangent.
-        let feet = FeetRange {
+        let tangents = FootRange::of(&self.feet.along[..poses.len()])?;
+        // An angle below a quarter turn is not larger than its tangent.
+        let feet = FootRange {
             first: self.s + tangents.first / turn.abs(),
             last: self.s + tangents.last / turn.abs(),
             ..tangents
@@ -247,7 +243,7 @@ impl PathTracker {
     fn closed_form(
         &self,
         range: SearchRange,
-        feet: FeetRange,
+        feet: FootRange,
         scale: f64,
         distances: &mut Vec<f64>,
     ) -> Option<usize> {
@@ -266,21 +262,22 @@ impl PathTracker {
     }
 }
 
-/// Extreme foot points of poses, arc length, and the index of the last one along the path.
+/// Foot points of poses that are first and last along the path, arc length or tangent of the angle on a circle, and the
+/// index of the last one.
 #[derive(Debug, Clone, Copy)]
-struct FeetRange {
+struct FootRange {
     first: f64,
     last: f64,
     furthest: usize,
 }
 
-impl FeetRange {
+impl FootRange {
     /// Returns the range of foot points; `None` if one is NaN.
     fn of(feet: &[f64]) -> Option<Self> {
         let [first, last] = vectorize(Extremes(feet))?;
         // Mostly the axes move forward.
         let furthest = feet.iter().rposition(|s| *s == last)?;
-        Some(FeetRange { first, last, furthest })
+        Some(FootRange { first, last, furthest })
     }
 }
 
