@@ -4,11 +4,11 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
+use crate::simd::{LANES, vectorize};
+
 mod series;
 
 use series::{GroupAddition, LaneSums, Sector};
-
-use crate::simd::{LANES, vectorize};
 
 /// Number of bins of the polar angle: a tenth of a degree each.
 const BINS: usize = 3600;
