@@ -37,6 +37,15 @@ fn gains_of_0_are_part_of_the_verdict() {
 }
 
 #[test]
+fn a_gantry_of_which_one_axis_rests_is_part_of_the_verdict() {
+    let beam = ["--set", "gantry.axes=[x, y]", "--set", "gantry.stiffness_n_um=2"];
+    let verdict = |input: &str| printed(&[&["run", input, "--quiet"], &beam[..]].concat());
+    let warning = "; the setpoints move x of gantry.axes and not y: the beam pulls at both";
+    assert!(verdict("x-constant").contains(warning), "{}", verdict("x-constant"));
+    assert!(!verdict("ballbar").contains("gantry"));
+}
+
+#[test]
 fn implausible_machine_files_give_warnings() {
     let folder = TestFolder::new("implausible_machines");
     assert_eq!(warnings(&folder, "machine.yaml", MACHINE), "");

@@ -70,10 +70,26 @@ impl<P> SimulatedRun<P> {
             .collect()
     }
 
-    /// Returns warnings on the loops of the moving axes.
+    /// Returns warnings on the loops of the moving axes, and on a gantry of which one axis rests.
     pub fn axis_warnings(&self) -> Vec<String> {
         let figures = self.outcome.figures.axes.iter();
         let moving = self.machine.axes().iter().zip(figures).filter(|(_, figures)| figures.moves);
-        moving.flat_map(|(axis, _)| axis_warnings::loops(axis, &self.machine.periods())).collect()
+        let loops = moving.flat_map(|(axis, _)| axis_warnings::loops(axis, &self.machine.periods()));
+        loops.chain(self.resting_gantry_axis()).collect()
+    }
+
+    /// Returns a warning if only one axis of a gantry has setpoints that move.
+    fn resting_gantry_axis(&self) -> Option<String> {
+        let axes = self.machine.gantry()?.axes;
+        let [first, second] = axes.map(|index| self.outcome.figures.axes.get(index));
+        let (moving, resting) = match (first?, second?) {
+            (moving, resting) if moving.moves && !resting.moves => (moving, resting),
+            (resting, moving) if moving.moves && !resting.moves => (moving, resting),
+            _ => return None,
+        };
+        Some(format!(
+            "the setpoints move {} of gantry.axes and not {}: the beam pulls at both; give setpoints for both",
+            moving.name, resting.name
+        ))
     }
 }
