@@ -1,8 +1,9 @@
 //! Part programs in G code: from the text to motions of the axes.
 //!
-//! Two modules, each usable on its own:
+//! Two modules, each usable on its own, and a third for both:
 //! - [`interpret`] reads a program (RS-274/NGC) and returns its [`motion`]s one by one, in constant memory.
 //! - [`plan`] computes the feed along these motions within the limits of the axes.
+//! - [`offline`] has the setpoints of a program for a simulation, and finds the lines with the largest errors.
 //!
 //! ```
 //! use std::io::Cursor;
@@ -29,6 +30,7 @@
 pub mod builtin;
 pub mod interpret;
 pub mod motion;
+pub mod offline;
 pub mod plan;
 mod start_line;
 

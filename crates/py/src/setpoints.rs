@@ -1,16 +1,21 @@
 //! Setpoints from scenarios and part programs.
 
+use std::cell::RefCell;
+use std::ffi::CString;
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use virtual_axes_core::path::Program;
 use virtual_axes_core::scenario::Scenario as CoreScenario;
 use virtual_axes_core::simulation::joint_limits;
-use virtual_axes_core::trial::{GridSource, ProgramSource, SourceError};
-use virtual_axes_nc::builtin::{BuiltinProgram, ProgramReader, open_program};
-use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions};
-use virtual_axes_nc::plan::{FeedPlanError, PartProgramPlanner, PlanOptions};
+use virtual_axes_core::trial::{GridSource, ProgramSource};
+use virtual_axes_nc::builtin::BuiltinProgram;
+use virtual_axes_nc::offline::{
+    OverrideSchedule, PartProgramOptions, PartProgramSource, ProgramTrack, parse_m_code,
+};
+use virtual_axes_nc::plan::PlanOptions;
 
 use crate::convert::{check_signals, value_error};
 use crate::machine::PyMachine;
@@ -127,70 +132,98 @@ impl PyScenario {
 #[pyclass(module = "virtual_axes_py._native", frozen)]
 pub struct PartProgram {
     path: String,
+    arguments: ProgramArguments,
+    options: PartProgramOptions,
+}
+
+/// Arguments of a part program.
+#[derive(Clone, IntoPyObject, FromPyObject)]
+struct ProgramArguments {
     /// Feed override, 1 for 100 %.
+    #[pyo3(item)]
     feed_override: f64,
+    /// M codes without effect.
+    #[pyo3(item)]
+    ignore: Vec<String>,
+    /// Bound of the chord error, m.
+    #[pyo3(item)]
+    chord_error: Option<f64>,
+    /// Bound of the centripetal acceleration, m/s².
+    #[pyo3(item)]
+    centripetal_acceleration: Option<f64>,
 }
 
-/// Setpoints of a planner.
-struct PlannedRows {
-    planner: PartProgramPlanner<Interpreter<ProgramReader>>,
-    path: String,
-    feed_override: f64,
-}
-
-impl GridSource for PlannedRows {
-    fn joints(&self) -> &[usize] {
-        self.planner.joints()
-    }
-
-    fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError> {
-        let setpoint = self.planner.next_setpoint(self.feed_override).map_err(|error| match error {
-            // The interpreter's error names the file.
-            FeedPlanError::Step(error) => error,
-            error => format!("{}: {error}", self.path).into(),
-        })?;
-        let Some(setpoint) = setpoint else { return Ok(false) };
-        row.copy_from_slice(setpoint.psec());
-        Ok(true)
+impl ProgramArguments {
+    fn options(&self) -> Result<PartProgramOptions, String> {
+        let ProgramArguments { feed_override, ignore, chord_error, centripetal_acceleration } = self;
+        if !(*feed_override > 0.0 && *feed_override <= 2.0) {
+            return Err(format!("feed_override {feed_override}: must be above 0 and at most 2"));
+        }
+        for (name, bound) in
+            [("chord_error", chord_error), ("centripetal_acceleration", centripetal_acceleration)]
+        {
+            if let Some(bound) = bound.filter(|bound| !(*bound > 0.0 && bound.is_finite())) {
+                return Err(format!("{name} {bound}: must be above 0 and finite"));
+            }
+        }
+        let codes =
+            ignore.iter().map(|code| parse_m_code(code).map_err(|error| format!("ignore {code:?}: {error}")));
+        let default = PlanOptions::default();
+        Ok(PartProgramOptions {
+            schedule: OverrideSchedule::constant(*feed_override),
+            ignored_m_codes: codes.collect::<Result<_, _>>()?,
+            plan: PlanOptions {
+                chord_error: chord_error.unwrap_or(default.chord_error),
+                centripetal_acceleration: centripetal_acceleration
+                    .unwrap_or(default.centripetal_acceleration),
+                ..default
+            },
+        })
     }
 }
 
 impl PartProgram {
-    pub fn rows(&self, machine: &PyMachine) -> PyResult<Rows> {
-        let failed = |error: &dyn std::fmt::Display| value_error(format!("{}: {error}", self.path));
-        let file = open_program(&self.path).map_err(|error| failed(&error))?;
-        let options = InterpreterOptions::for_machine(&machine.config);
-        let steps = Interpreter::new(file, &self.path, options);
-        let planner = PartProgramPlanner::new(steps, &machine.config, PlanOptions::default())
-            .map_err(|error| failed(&error))?;
-        Rows::read(PlannedRows { planner, path: self.path.clone(), feed_override: self.feed_override })
+    /// Returns the setpoints with their lines.
+    pub fn rows(&self, machine: &PyMachine) -> PyResult<(Rows, ProgramTrack)> {
+        let track = RefCell::default();
+        let source = PartProgramSource::open(&self.path, &machine.config, &self.options, &track);
+        let rows = Rows::read(source.map_err(value_error)?)?;
+        Ok((rows, track.into_inner()))
+    }
+
+    /// Warns of words without effect; `level` is the number of the frame of Python that the warning names.
+    pub fn warn(&self, py: Python<'_>, track: &ProgramTrack, level: i32) -> PyResult<()> {
+        for (line, note) in track.notes() {
+            let text = CString::new(format!("{}:{line}: {note}", self.path)).map_err(value_error)?;
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, level)?;
+        }
+        Ok(())
     }
 }
 
 #[pymethods]
 impl PartProgram {
     #[staticmethod]
-    #[pyo3(signature = (name_or_path, feed_override = 1.0))]
-    fn load(name_or_path: String, feed_override: f64) -> PyResult<Self> {
-        if !(feed_override > 0.0 && feed_override <= 2.0) {
-            return Err(value_error(format!("feed_override {feed_override}: must be above 0 and at most 2")));
-        }
-        Ok(PartProgram { path: name_or_path, feed_override })
+    fn load(name_or_path: String, arguments: ProgramArguments) -> PyResult<Self> {
+        let options = arguments.options().map_err(value_error)?;
+        Ok(PartProgram { path: name_or_path, arguments, options })
     }
 
     #[getter]
-    fn path(&self) -> &str {
+    pub fn path(&self) -> &str {
         &self.path
     }
 
     fn psec<'py>(&self, py: Python<'py>, machine: NativeMachine<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let machine: &PyMachine = &machine.native;
-        py.detach(|| self.rows(machine))?.into_array(py)
+        let (rows, track) = py.detach(|| self.rows(machine))?;
+        self.warn(py, &track, 1)?;
+        rows.into_array(py)
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Recreation<'py, f64>> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Recreation<'py, ProgramArguments>> {
         let this = slf.get();
-        Ok((slf.get_type().getattr("load")?, (this.path.clone(), this.feed_override)))
+        Ok((slf.get_type().getattr("load")?, (this.path.clone(), this.arguments.clone())))
     }
 
     fn __repr__(&self) -> String {

@@ -12,7 +12,8 @@ use virtual_axes_core::path::Program;
 use virtual_axes_core::trial::{
     self, GridRows, Measures, SetpointSource, Tick, Trial, TrialError, TrialOutcome,
 };
-use virtual_axes_io::files::{figures_json, trace_writer};
+use virtual_axes_io::files::{figures_json, part_program_json, trace_writer};
+use virtual_axes_nc::offline::{LineErrors, ProgramFigures, ProgramTrack};
 use virtual_axes_report::runs::{SimulatedRun, SimulationPage, controller_name};
 
 use crate::convert::{check_signals, value_error};
@@ -45,10 +46,12 @@ pub enum Given<'py> {
     PartProgram(PyRef<'py, PartProgram>),
 }
 
-/// Setpoints and, of a scenario, its path.
+/// Setpoints, of a scenario with its path, of a part program with its lines.
 pub struct Prepared {
     pub rows: Rows,
     pub program: Option<Arc<Program>>,
+    /// Lines of the setpoints, and the file that contains them.
+    pub part: Option<(ProgramTrack, String)>,
 }
 
 impl Given<'_> {
@@ -67,7 +70,8 @@ impl Given<'_> {
                     return Err(PyValueError::new_err("psec has no setpoints; it needs at least one row"));
                 }
                 let values = array.as_array().iter().copied().collect();
-                Ok(Prepared { rows: Rows { joints: (0..axes).collect(), values }, program: None })
+                let rows = Rows { joints: (0..axes).collect(), values };
+                Ok(Prepared { rows, program: None, part: None })
             }
             Given::Scenario(scenario) => {
                 let scenario: &PyScenario = scenario;
@@ -76,12 +80,15 @@ impl Given<'_> {
                     Ok(Prepared {
                         rows: scenario.rows(machine, Arc::clone(&program))?,
                         program: Some(program),
+                        part: None,
                     })
                 })
             }
             Given::PartProgram(part) => {
                 let part: &PartProgram = part;
-                py.detach(|| Ok(Prepared { rows: part.rows(machine)?, program: None }))
+                let (rows, track) = py.detach(|| part.rows(machine))?;
+                part.warn(py, &track, 2)?;
+                Ok(Prepared { rows, program: None, part: Some((track, part.path().to_owned())) })
             }
         }
     }
@@ -132,17 +139,23 @@ impl Prepared {
     }
 }
 
+/// Returns the outcome and, with contour errors, the figures of a part program.
 fn run(
     machine: &PyMachine,
-    prepared: &Prepared,
+    prepared: &mut Prepared,
     measures: Measures,
     every_tick: bool,
     table: &mut SignalTable,
-) -> PyResult<TrialOutcome> {
+) -> PyResult<(TrialOutcome, Option<ProgramFigures>)> {
+    let part = prepared.part.take().filter(|_| measures.contour);
+    let mut part = part.map(|(track, name)| (LineErrors::new(&machine.config), track, name));
     let (trial, source) = (prepared.trial(machine, measures, false), prepared.source());
     let mut signals = SignalCheck::new();
     let callback = |tick: Tick<'_>| {
         table.push(tick.time, tick.machine);
+        if let Some((lines, track, _)) = &mut part {
+            lines.add(&tick, track);
+        }
         if tick.position_instant { signals.cycle() } else { Ok(()) }
     };
     let outcome = if every_tick {
@@ -150,7 +163,12 @@ fn run(
     } else {
         trial::run(&trial, source, callback)
     };
-    outcome.map_err(|error| signals.error(error))
+    let outcome = outcome.map_err(|error| signals.error(error))?;
+    let part = part.map(|(mut lines, track, name)| {
+        lines.finish_cycles();
+        lines.figures(&name, &track)
+    });
+    Ok((outcome, part.transpose()?))
 }
 
 /// Returns signals, figures as JSON and the number of setpoints.
@@ -167,9 +185,13 @@ pub fn simulate<'py>(
         let known = crate::signals::NAMES.join(", ");
         value_error(format!("signal {name:?} is unknown; known are {known}"))
     })?;
-    let prepared = psec.prepare(py, machine)?;
-    let outcome = py.detach(|| run(machine, &prepared, measures, every_tick, &mut table))?;
-    let json = serde_json::Value::Object(figures_json(&outcome.figures)).to_string();
+    let mut prepared = psec.prepare(py, machine)?;
+    let (outcome, part) = py.detach(|| run(machine, &mut prepared, measures, every_tick, &mut table))?;
+    let mut json = figures_json(&outcome.figures);
+    if let Some(part) = part {
+        json.insert("part_program".to_owned(), part_program_json(&part));
+    }
+    let json = serde_json::Value::Object(json).to_string();
     let setpoints = prepared.rows.values.len() / prepared.rows.joints.len().max(1);
     Ok((table.into_dict(py, machine.config.axes().len())?, json, setpoints))
 }

@@ -1,5 +1,6 @@
 //! Feed along the path of a part program: programmed and reached feed, and contour error.
 
+use virtual_axes_nc::offline::CycleError;
 use virtual_axes_report::{AxisRange, Chart, ChartAxis, ChartSeries, DisplayUnit, Panel, SeriesStyle};
 
 /// Largest number of intervals that are kept; twice as many would not be visible in a plot.
@@ -44,8 +45,14 @@ pub struct FeedAlongPath {
 }
 
 impl FeedAlongPath {
-    /// Adds a position cycle: path position, m, programmed and reached feed, m/s, contour error, m.
-    pub fn add(&mut self, path: f64, programmed: f64, reached: f64, error: f64) {
+    /// Adds a position cycle.
+    pub fn add(&mut self, cycle: &CycleError) {
+        let &CycleError {
+            path_position: path,
+            programmed_feed: programmed,
+            reached_feed: reached,
+            contour_error: error,
+        } = cycle;
         let finite = if programmed.is_finite() { programmed } else { f64::NAN };
         let added =
             FeedInterval { reached: [[path, reached]; 2], programmed: [path, finite], error: [path, error] };
@@ -115,7 +122,13 @@ mod tests {
                 0.1
             };
             let programmed = if k % 2 == 0 { f64::INFINITY } else { 0.2 };
-            feed.add(1e-5 * k as f64, programmed, reached, if k == 777 { 9e-6 } else { 1e-6 });
+            let contour_error = if k == 777 { 9e-6 } else { 1e-6 };
+            feed.add(&CycleError {
+                path_position: 1e-5 * k as f64,
+                programmed_feed: programmed,
+                reached_feed: reached,
+                contour_error,
+            });
         }
         assert!(feed.intervals.len() < MOST && feed.cycles == 16);
         let chart = feed.chart();
@@ -130,8 +143,14 @@ mod tests {
     #[test]
     fn a_short_program_has_each_cycle() {
         let mut feed = FeedAlongPath::default();
-        feed.add(0.0, 0.1, 0.05, 0.0);
-        feed.add(1e-3, f64::INFINITY, 0.4, 1e-6);
+        let cycle = |[path_position, programmed_feed, reached_feed, contour_error]: [f64; 4]| CycleError {
+            path_position,
+            programmed_feed,
+            reached_feed,
+            contour_error,
+        };
+        feed.add(&cycle([0.0, 0.1, 0.05, 0.0]));
+        feed.add(&cycle([1e-3, f64::INFINITY, 0.4, 1e-6]));
         let chart = feed.chart();
         assert_eq!(chart.panels[1].series[0].points, [[0.0, 0.0], [1e-3, 1e-6]]);
         assert!(chart.panels[0].series[0].points[1][1].is_nan());

@@ -9,7 +9,6 @@ use std::sync::Arc;
 
 use crate::part_program::{count_lines, is_part_program, open_other};
 use crate::part_program_arguments::PartProgramArguments;
-use crate::part_program_source::{PartProgramOptions, PartProgramSource, ProgramTrack};
 use crate::print_error;
 use crate::progress::TrialProgress;
 use virtual_axes_core::config::MachineConfig;
@@ -23,6 +22,7 @@ use virtual_axes_io::files::{
     self, FileKind, McapTrajectories, PsecCsvReader, PsecRow, TimeGap, read_psec_yaml,
 };
 use virtual_axes_nc::builtin::BuiltinProgram;
+use virtual_axes_nc::offline::{PartProgramOptions, PartProgramSource, ProgramTrack};
 
 /// Scenario, part program or file with setpoints.
 #[derive(Debug)]

@@ -1,7 +1,7 @@
 //! JSON output of `virtual_axes run`.
 
 use serde_json::{Map, Value, json};
-use virtual_axes_io::files::figures_json;
+use virtual_axes_io::files::{figures_json, part_program_json};
 
 use crate::input::CommandInput;
 use crate::variant::VariantRun;
@@ -22,7 +22,7 @@ fn run(run: &VariantRun) -> Value {
     object.insert("changes".to_owned(), json!(run.changes));
     object.extend(figures_json(&run.outcome.figures));
     if let Some(program) = &run.part_program {
-        object.insert("part_program".to_owned(), program.json());
+        object.insert("part_program".to_owned(), part_program_json(&program.figures));
     }
     Value::Object(object)
 }

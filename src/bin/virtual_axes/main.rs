@@ -32,9 +32,9 @@ mod output_arguments;
 mod parameters;
 mod part_program;
 mod part_program_arguments;
-mod part_program_source;
 mod period;
 mod pose;
+mod program_report;
 mod program_text;
 mod progress;
 mod psec;
@@ -51,7 +51,6 @@ mod tune;
 mod tune_output;
 mod urdf;
 mod variant;
-mod worst_lines;
 
 use std::error::Error;
 use std::fmt::Display;

@@ -1,8 +1,7 @@
 //! Arguments of commands that plan part programs.
 
+use virtual_axes_nc::offline::{OverrideSchedule, PartProgramOptions, parse_m_code};
 use virtual_axes_nc::plan::PlanOptions;
-
-use crate::part_program_source::{OverrideSchedule, PartProgramOptions};
 
 /// Micrometer, m.
 const MICROMETER: f64 = 1e-6;
@@ -14,7 +13,7 @@ pub struct PartProgramArguments {
     #[arg(long = "override", value_name = "PERCENT|S:PERCENT,…", allow_hyphen_values = true)]
     feed_override: Option<String>,
     /// M codes that have no effect in a part program, with the words of their lines: 7,M110. Each one found is noted.
-    #[arg(long, value_name = "M_CODES", value_delimiter = ',', value_parser = m_code)]
+    #[arg(long, value_name = "M_CODES", value_delimiter = ',', value_parser = parse_m_code)]
     pub ignore: Vec<u32>,
     /// Bound of the chord error of a part program's setpoints as a polyline, µm: slows the feed in curves [default: none].
     #[arg(long, value_name = "UM", value_parser = positive, allow_negative_numbers = true)]
@@ -56,12 +55,6 @@ impl PartProgramArguments {
         };
         Ok(PartProgramOptions { schedule, ignored_m_codes: self.ignore.clone(), plan })
     }
-}
-
-/// Reads an M code with or without its letter.
-fn m_code(text: &str) -> Result<u32, String> {
-    let digits = text.strip_prefix(['M', 'm']).unwrap_or(text);
-    digits.parse().map_err(|_| "must be an M code, as 100 or M100".to_owned())
 }
 
 /// Reads a positive number.

@@ -12,16 +12,18 @@ use virtual_axes_core::text::escaped;
 use virtual_axes_core::trial::{Measures, Tick, Trial, TrialOutcome};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_io::files::{TraceWriter, trace_writer};
+use virtual_axes_nc::offline::LineErrors;
 use virtual_axes_report::runs::{figure, table, verdict};
 
+use crate::feed_along_path::FeedAlongPath;
 use crate::input::CommandInput;
 use crate::output_arguments::{OutputArguments, OutputFormat};
 use crate::period::PeriodArgument;
+use crate::program_report::ProgramReport;
 use crate::report::ReportMachine;
 use crate::setpoint_summary::SetpointSummary;
 use crate::trial_arguments::TrialArguments;
 use crate::variant::{self, ControllerName, VariantRun};
-use crate::worst_lines::{LineErrors, ProgramFigures};
 use crate::{interrupt, json, program_text, report, text_table};
 
 /// Arguments of `virtual_axes run`.
@@ -126,7 +128,7 @@ fn trial(
     program: Option<&Arc<Program>>,
     parameters: &Parameters,
     config: &MachineConfig,
-) -> Result<(TrialOutcome, SetpointSummary, Option<ProgramFigures>), Box<dyn Error>> {
+) -> Result<(TrialOutcome, SetpointSummary, Option<ProgramReport>), Box<dyn Error>> {
     let trial = Trial {
         machine: config,
         program: program.cloned(),
@@ -144,10 +146,11 @@ fn trial(
     let is_subsampled = trace.as_ref().is_some_and(|t| t.period % config.periods().position != 0);
     let mut summary = SetpointSummary::default();
     let mut lines = input.is_part_program().then(|| LineErrors::new(config));
+    let mut feed = FeedAlongPath::default();
     let on_tick = |tick: Tick<'_>| {
         summary.add(&tick);
         if let Some(lines) = &mut lines {
-            lines.add(&tick, &mut input.track().borrow_mut());
+            lines.add(&tick, &mut input.track().borrow_mut()).iter().for_each(|cycle| feed.add(cycle));
         }
         if tick.position_instant {
             interrupt::check()?;
@@ -166,15 +169,10 @@ fn trial(
         trace.finish()?;
     }
     let part_program = match lines {
-        Some(lines) => {
-            let track = input.track().borrow();
-            let (worst_lines, feed) = lines.finish(input.name())?;
-            Some(ProgramFigures {
-                cycle_time: track.cycle_time,
-                programmed_time: track.programmed_time,
-                worst_lines,
-                feed,
-            })
+        Some(mut lines) => {
+            lines.finish_cycles().iter().for_each(|cycle| feed.add(cycle));
+            let figures = lines.figures(input.name(), &input.track().borrow())?;
+            Some(ProgramReport { figures, feed })
         }
         None => None,
     };
@@ -238,7 +236,7 @@ fn single(run: &VariantRun) -> Vec<String> {
     axes.extend(remarks.map(|remark| text_table::wrapped_line(&remark)));
     let path = table::path(figures);
     let path = (!path.rows.is_empty()).then(|| format!("{}{}\n", text_table::text(&path), table::SAMPLING));
-    let program = run.part_program.as_ref().map(ProgramFigures::text);
+    let program = run.part_program.as_ref().map(ProgramReport::text);
     std::iter::once(axes).chain(path).chain(program).collect()
 }
 

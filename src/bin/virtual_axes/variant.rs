@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use crate::worst_lines::ProgramFigures;
+use crate::program_report::ProgramReport;
 use virtual_axes_core::config::{
     Assignment, ConfigError, MachineConfig, Parameters, Value, ValueSource, parse_assignment,
 };
@@ -108,4 +108,4 @@ pub fn checked(
 }
 
 /// One run of a command with its variant of the machine.
-pub type VariantRun = SimulatedRun<ProgramFigures>;
+pub type VariantRun = SimulatedRun<ProgramReport>;

@@ -8,6 +8,7 @@ use virtual_axes_core::trial::{
     AxisFigures, BidirectionalFigures, CircleFigures, CornerFigures, Figures, Reference,
 };
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MICROMETER, MILLIDEGREE, MILLIMETER};
+use virtual_axes_nc::offline::{ProgramFigures, WorstLine};
 
 /// Returns all figures as a JSON object, the keys of `virtual_axes run --json` (docs/reference/json.md).
 pub fn figures_json(figures: &Figures) -> Map<String, Value> {
@@ -23,6 +24,25 @@ pub fn figures_json(figures: &Figures) -> Map<String, Value> {
     object.insert("corners".to_owned(), figures.corners.iter().map(corner).collect());
     object.insert("more_corners".to_owned(), json!(figures.more_corners));
     object
+}
+
+/// Returns times and worst lines of a part program as a JSON object, `part_program` of `virtual_axes run --json`.
+pub fn part_program_json(figures: &ProgramFigures) -> Value {
+    let line = |worst: &WorstLine| {
+        json!({
+            "line": worst.line,
+            "text": worst.text,
+            "cause": worst.cause.text(),
+            "contour_error_um": worst.error / MICROMETER,
+            "orientation_error_mdeg": worst.orientation / MILLIDEGREE,
+            "time_s": worst.time,
+        })
+    };
+    json!({
+        "cycle_time_s": figures.cycle_time,
+        "programmed_time_s": figures.programmed_time,
+        "worst_lines": figures.worst_lines.iter().map(line).collect::<Vec<_>>(),
+    })
 }
 
 fn axis(axis: &AxisFigures) -> Value {

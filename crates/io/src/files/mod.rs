@@ -4,7 +4,7 @@
 //! Position setpoints are read from CSV ([`PsecCsvReader`], streaming), YAML ([`read_psec_yaml`]) and MCAP
 //! ([`McapTrajectories`]), measured axis data from CSV, MCAP and exports of controls ([`read_recording`],
 //! [`inspect_recording`]). Traces ([`TraceWriter`]) and setpoints ([`PsecWriter`]) are written atomically
-//! ([`OutputFile`]), figures of trials as JSON ([`figures_json`]); recordings of the node ([`BoundedRecording`]) are readable up to the last complete chunk.
+//! ([`OutputFile`]), figures of trials as JSON ([`figures_json`], [`part_program_json`]); recordings of the node ([`BoundedRecording`]) are readable up to the last complete chunk.
 
 mod bounded_recording;
 mod cdr;
@@ -31,7 +31,7 @@ mod tuning_json;
 
 pub use bounded_recording::{BoundedRecording, RecordedTopic};
 pub use cdr::encode_cdr;
-pub use figures_json::figures_json;
+pub use figures_json::{figures_json, part_program_json};
 pub use input::{FileKind, Input, InputError};
 pub use mcap_reader::McapFileError;
 pub use output::OutputFile;

@@ -14,6 +14,8 @@ The ROS messages of the node are in the module `virtual_axes`, which ROS generat
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from . import design
 from ._native import PartProgram, Scenario, machine_names, nc_program_names, scenario_names
 from .chunks import SweepResult
@@ -62,10 +64,28 @@ def scenario(name_or_path: str, feed: float | None = None) -> Scenario:
     return Scenario.load(name_or_path, feed)
 
 
-def nc_program(name_or_path: str, feed_override: float = 1.0) -> PartProgram:
+def nc_program(
+    name_or_path: str,
+    feed_override: float = 1.0,
+    *,
+    ignore: Iterable[int | str] = (),
+    chord_error: float | None = None,
+    centripetal_acceleration: float | None = None,
+) -> PartProgram:
     """Names a part program in G code: a built-in one (`nc_program_names()`) or a file.
 
-    It is read and planned when it is simulated.
-    `feed_override` is above 0 and at most 2, 1 for the programmed feed. Raises `ValueError` for another one.
+    It is read and planned when it is simulated. Words that have no effect then give a `UserWarning` with file and line.
+    The figures of a run have its times and its lines with the largest contour errors, `figures["part_program"]`, unless
+    only those of the axes are computed.
+
+    `feed_override` is above 0 and at most 2, 1 for the programmed feed. `ignore` contains M codes without effect, as
+    `[7, "M110"]`. `chord_error` bounds the chord error of the setpoints as a polyline, m, and
+    `centripetal_acceleration` that of the tool tip, m/s². Raises `ValueError` for other values.
     """
-    return PartProgram.load(name_or_path, feed_override)
+    arguments = {
+        "feed_override": feed_override,
+        "ignore": [str(code) for code in ([ignore] if isinstance(ignore, str) else ignore)],
+        "chord_error": chord_error,
+        "centripetal_acceleration": centripetal_acceleration,
+    }
+    return PartProgram.load(name_or_path, arguments)

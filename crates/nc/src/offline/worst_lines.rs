@@ -4,18 +4,13 @@ use std::collections::VecDeque;
 use std::io::{self, BufRead};
 
 use nalgebra::Vector3;
-use serde_json::{Value, json};
 use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_core::kinematics::{Kinematics, ToolPose};
-use virtual_axes_core::text::escaped;
 use virtual_axes_core::trial::Tick;
-use virtual_axes_core::units::{MILLIDEGREE, Nanoseconds, seconds};
-use virtual_axes_nc::builtin::open_program;
-use virtual_axes_report::{Section, Table, TableColumn};
+use virtual_axes_core::units::{Nanoseconds, seconds};
 
-use crate::feed_along_path::FeedAlongPath;
-use crate::part_program_source::{ProgramTrack, TrackPoint};
-use crate::text_table;
+use super::setpoints::{ProgramTrack, TrackPoint};
+use crate::builtin::open_program;
 
 /// Number of lines reported.
 const COUNT: usize = 10;
@@ -88,86 +83,21 @@ pub struct ProgramFigures {
     pub cycle_time: f64,
     /// Duration of all motions at their programmed feed, s.
     pub programmed_time: f64,
-    /// Lines with the largest contour errors.
+    /// Lines with the largest contour errors, the largest first.
     pub worst_lines: Vec<WorstLine>,
-    /// Feed along the path.
-    pub feed: FeedAlongPath,
 }
 
-impl ProgramFigures {
-    /// Returns the times and a table of the worst lines.
-    pub fn text(&self) -> String {
-        let table = self.worst_table(escaped);
-        text_table::wrapped_line(&self.times()) + &text_table::aligned(&table, &[1, 2])
-    }
-
-    /// Returns a section of a page: times, worst lines and feed along the path.
-    pub fn section(&self, heading: &str) -> Section {
-        let mut table = self.worst_table(str::to_owned);
-        table.caption = "Lines with the largest contour errors".to_owned();
-        Section {
-            paragraphs: vec![format!("{}.", self.times())],
-            tables: vec![table],
-            charts: vec![self.feed.chart()],
-            ..Section::new(heading)
-        }
-    }
-
-    fn times(&self) -> String {
-        format!(
-            "cycle time {:.2} s; motions at programmed feed alone {:.2} s",
-            self.cycle_time, self.programmed_time
-        )
-    }
-
-    /// Returns a table of the worst lines; `escape` is applied to the texts of lines.
-    fn worst_table(&self, escape: impl Fn(&str) -> String) -> Table {
-        let column =
-            |name: &str, unit: &str| TableColumn { name: name.to_owned(), unit: unit.to_owned(), run: None };
-        let row = |worst: &WorstLine| {
-            vec![
-                worst.line.to_string(),
-                escape(&worst.text),
-                worst.cause.text(),
-                format!("{:.2}", worst.error * 1e6),
-                format!("{:.3}", worst.time),
-            ]
-        };
-        let mut columns = vec![
-            column("line", ""),
-            column("text", ""),
-            column("cause", ""),
-            column("contour error", "µm"),
-            column("time", "s"),
-        ];
-        let mut rows: Vec<Vec<String>> = self.worst_lines.iter().map(row).collect();
-        if self.worst_lines.iter().any(|worst| worst.orientation > 0.0) {
-            columns.insert(4, column("orientation error", "mdeg"));
-            for (row, worst) in rows.iter_mut().zip(&self.worst_lines) {
-                row.insert(4, format!("{:.2}", worst.orientation / MILLIDEGREE));
-            }
-        }
-        Table { caption: String::new(), columns, rows }
-    }
-
-    /// Returns all figures as JSON.
-    pub fn json(&self) -> Value {
-        let line = |worst: &WorstLine| {
-            json!({
-                "line": worst.line,
-                "text": worst.text,
-                "cause": worst.cause.text(),
-                "contour_error_um": worst.error * 1e6,
-                "orientation_error_mdeg": worst.orientation / MILLIDEGREE,
-                "time_s": worst.time,
-            })
-        };
-        json!({
-            "cycle_time_s": self.cycle_time,
-            "programmed_time_s": self.programmed_time,
-            "worst_lines": self.worst_lines.iter().map(line).collect::<Vec<_>>(),
-        })
-    }
+/// Feed and contour error in a position cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CycleError {
+    /// Path position of the nearest setpoint from the start of the program, m.
+    pub path_position: f64,
+    /// Programmed feed of the tool tip, m/s; infinite at rapid traverse, NaN where rotary axes move alone.
+    pub programmed_feed: f64,
+    /// Speed of the simulated tool tip, m/s.
+    pub reached_feed: f64,
+    /// Contour error, m.
+    pub contour_error: f64,
 }
 
 /// Setpoint with its line.
@@ -198,7 +128,6 @@ pub struct LineErrors {
     last_tip: Option<Vector3<f64>>,
     /// Line of the cycle before, and the largest orientation error in the cycles in a row on it, rad.
     last_line: (usize, f64),
-    feed: FeedAlongPath,
 }
 
 impl LineErrors {
@@ -216,14 +145,15 @@ impl LineErrors {
             worst: Vec::new(),
             last_tip: None,
             last_line: (0, 0.0),
-            feed: FeedAlongPath::default(),
         }
     }
 
-    /// Adds a position cycle; other ticks are ignored.
-    pub fn add(&mut self, tick: &Tick<'_>, track: &mut ProgramTrack) {
+    /// Adds a position cycle and takes its setpoint from `track`; other ticks are ignored.
+    ///
+    /// Returns feed and error of an earlier cycle, for which later setpoints were awaited.
+    pub fn add(&mut self, tick: &Tick<'_>, track: &mut ProgramTrack) -> Option<CycleError> {
         if !tick.position_instant {
-            return;
+            return None;
         }
         let samples = || tick.machine.axes().iter().map(|axis| axis.sample());
         let joints: Vec<f64> = samples().map(|sample| sample.psec).collect();
@@ -245,14 +175,12 @@ impl LineErrors {
         self.explain(AFTER);
         let positions: Vec<f64> = samples().map(|sample| sample.position).collect();
         self.poses.push_back((self.kinematics.forward(&positions), tick.time));
-        if self.poses.len() > AFTER {
-            self.evaluate();
-        }
+        if self.poses.len() > AFTER { self.evaluate() } else { None }
     }
 
     /// Evaluates the first waiting tool pose.
-    fn evaluate(&mut self) {
-        let Some((actual, time)) = self.poses.pop_front() else { return };
+    fn evaluate(&mut self) -> Option<CycleError> {
+        let (actual, time) = self.poses.pop_front()?;
         let (mut error, mut nearest, mut axis) = (f64::INFINITY, 0, actual.axis);
         for (i, pair) in self.window.iter().zip(self.window.iter().skip(1)).enumerate() {
             let [from, to] = [&pair.0.pose, &pair.1.pose];
@@ -261,16 +189,21 @@ impl LineErrors {
                 (error, nearest, axis) = (distance, i + 1, from.axis + (to.axis - from.axis) * along);
             }
         }
-        if error.is_finite() {
+        let last_tip = self.last_tip.replace(actual.tip);
+        error.is_finite().then(|| {
             let TrackedSetpoint { place, tip_feed, .. } = &self.window[nearest];
-            let reached = self.last_tip.map_or(0.0, |last| (actual.tip - last).norm() / self.period);
-            self.feed.add(place.path_position, *tip_feed, reached, error);
+            let found = CycleError {
+                path_position: place.path_position,
+                programmed_feed: *tip_feed,
+                reached_feed: last_tip.map_or(0.0, |last| (actual.tip - last).norm() / self.period),
+                contour_error: error,
+            };
             let orientation = Kinematics::orientation_error(&axis, &actual.axis);
             let before = if self.last_line.0 == place.line { self.last_line.1 } else { 0.0 };
             self.last_line = (place.line, orientation.max(before));
             self.record(error, nearest, time);
-        }
-        self.last_tip = Some(actual.tip);
+            found
+        })
     }
 
     fn record(&mut self, error: f64, index: usize, time: Nanoseconds) {
@@ -341,14 +274,20 @@ impl LineErrors {
         }
     }
 
-    /// Returns the worst lines with their texts from the file `name`, the largest error first, and the feed.
+    /// Evaluates the last position cycles, in their order.
+    pub fn finish_cycles(&mut self) -> Vec<CycleError> {
+        let cycles = (0..self.poses.len()).filter_map(|_| self.evaluate()).collect();
+        self.explain(0);
+        cycles
+    }
+
+    /// Returns the figures of the program with the texts of the lines from the file `name`; `track` has its times. Call it
+    /// after [`finish_cycles`](Self::finish_cycles).
     ///
     /// # Errors
     ///
     /// Returns an error if the file cannot be read.
-    pub fn finish(mut self, name: &str) -> io::Result<(Vec<WorstLine>, FeedAlongPath)> {
-        (0..self.poses.len()).for_each(|_| self.evaluate());
-        self.explain(0);
+    pub fn figures(self, name: &str, track: &ProgramTrack) -> io::Result<ProgramFigures> {
         let mut worst: Vec<WorstLine> = self.worst.into_iter().map(|(worst, _)| worst).collect();
         let last = worst.iter().map(|worst| worst.line).max().unwrap_or(0);
         for (i, text) in open_program(name)?.split(b'\n').take(last).enumerate() {
@@ -357,7 +296,8 @@ impl LineErrors {
                 worst.text = String::from_utf8_lossy(&text).trim().chars().take(TEXT).collect();
             }
         }
-        Ok((worst, self.feed))
+        let ProgramTrack { cycle_time, programmed_time, .. } = *track;
+        Ok(ProgramFigures { cycle_time, programmed_time, worst_lines: worst })
     }
 }
 

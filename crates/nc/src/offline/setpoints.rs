@@ -2,15 +2,15 @@
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, VecDeque};
-use std::error::Error;
 
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::trial::{GridSource, SourceError};
 use virtual_axes_core::units::{Nanoseconds, seconds};
-use virtual_axes_nc::builtin::{ProgramReader, open_program};
-use virtual_axes_nc::interpret::{IgnoredCode, Interpreter, InterpreterOptions, ProgramError};
-use virtual_axes_nc::motion::{Blend, PathControl, ProgramEvent, ProgramStep};
-use virtual_axes_nc::plan::{FeedPlanError, PartProgramPlanner, PlanOptions};
+
+use crate::builtin::{ProgramReader, open_program};
+use crate::interpret::{IgnoredCode, Interpreter, InterpreterOptions, ProgramError};
+use crate::motion::{Blend, PathControl, ProgramEvent, ProgramStep};
+use crate::plan::{FeedPlanError, PartProgramPlanner, PlanOptions};
 
 /// Hour, s.
 const HOUR: f64 = 3600.0;
@@ -49,6 +49,11 @@ impl OverrideSchedule {
         Ok(Self(points))
     }
 
+    /// Creates a constant feed override, 1 for 100 %.
+    pub fn constant(factor: f64) -> Self {
+        Self(vec![(0.0, factor)])
+    }
+
     fn at(&self, time: f64) -> f64 {
         let OverrideSchedule(points) = self;
         points.iter().take_while(|(from, _)| *from <= time).last().map_or(1.0, |(_, value)| *value)
@@ -64,6 +69,16 @@ pub struct PartProgramOptions {
     pub ignored_m_codes: Vec<u32>,
     /// Options of the feed planner.
     pub plan: PlanOptions,
+}
+
+/// Reads an M code with or without its letter.
+///
+/// # Errors
+///
+/// Returns an error for other texts.
+pub fn parse_m_code(text: &str) -> Result<u32, String> {
+    let digits = text.strip_prefix(['M', 'm']).unwrap_or(text);
+    digits.parse().map_err(|_| "must be an M code, as 100 or M100".to_owned())
 }
 
 /// Place of a setpoint on the path of a program.
@@ -165,7 +180,7 @@ impl<'a> PartProgramSource<'a> {
         machine: &MachineConfig,
         options: &'a PartProgramOptions,
         track: &'a RefCell<ProgramTrack>,
-    ) -> Result<Self, Box<dyn Error>> {
+    ) -> Result<Self, String> {
         let file = open_program(name).map_err(|error| format!("{name}: {error}"))?;
         let mut interpreter = InterpreterOptions::for_machine(machine);
         interpreter.ignored_m_codes.clone_from(&options.ignored_m_codes);
