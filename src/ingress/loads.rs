@@ -1,8 +1,7 @@
 //! Axis loads from `JointState` messages: effort as external force or torque.
 
-use virtual_axes_core::simulation::MAX_LOAD;
+use virtual_axes_core::simulation::check_load;
 use virtual_axes_core::text::shortened;
-use virtual_axes_core::units::Rounded;
 use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 
 /// Returns the loads of a message: index of the axis in `joints` and load, N or N·m.
@@ -33,9 +32,7 @@ pub fn loads(message: &JointState, joints: &[String]) -> Result<Vec<(usize, f64)
             if message.name.iter().filter(|n| *n == name).count() > 1 {
                 return Err(format!("joint {name} is given twice"));
             }
-            if load.is_nan() || load.abs() > MAX_LOAD {
-                return Err(format!("joint {name}: effort is {}; it must lie in ±{MAX_LOAD}", Rounded(load)));
-            }
+            check_load(load).map_err(|error| format!("joint {name}: effort is {error}"))?;
             Ok((index, load))
         })
         .collect()

@@ -52,6 +52,20 @@ fn an_override_of_half_doubles_the_time() {
 }
 
 #[test]
+fn a_program_that_takes_days_is_rejected_at_once() {
+    let folder = TestFolder::new("part_program_days");
+    for text in ["G21\nG1 X10 F0.0001\nM2\n", "G21\nG4 P99999999\nG1 X1 F100\nM2\n"] {
+        let name = program(&folder, text);
+        for command in ["run", "check"] {
+            assert_rejected(
+                &[command, &name],
+                &["part.nc:", "takes longer than 100 h", "check feed and dwell"],
+            );
+        }
+    }
+}
+
+#[test]
 fn errors_name_file_and_line() {
     let folder = TestFolder::new("part_program_errors");
     let name = program(&folder, "G21 G90\nG1 X10 F1000\nG1 X900\n");

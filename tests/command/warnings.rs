@@ -29,6 +29,53 @@ fn unstable_inner_loops_are_part_of_the_verdict() {
 }
 
 #[test]
+fn a_gain_without_poles_is_part_of_the_verdict() {
+    for gain in ["1e6", "1e8", "1e9"] {
+        let text = verdict("x-constant", &format!("x.position_loop.gain={gain}"));
+        assert!(text.contains("the position loop of x"), "{text}");
+    }
+}
+
+#[test]
+fn without_motion_no_axis_has_an_error() {
+    let folder = TestFolder::new("no_motion");
+    for (name, text) in [("one.csv", "time,x\n0,0\n"), ("dwell.nc", "G4 P0.5\nM2\n"), ("end.nc", "M2\n")] {
+        let file = folder.file(name, text);
+        let output = run(&["run", file.to_str().expect("UTF-8"), "--quiet"]);
+        assert_eq!(String::from_utf8_lossy(&output.stdout), "no axis moves\n", "{name}");
+    }
+}
+
+#[test]
+fn a_slow_part_program_has_no_doubtful_time() {
+    let folder = TestFolder::new("slow_program");
+    let file = folder.file("slow.nc", "G21 G90\nG1 X1 F20\nM2\n");
+    let text = printed(&["run", file.to_str().expect("UTF-8"), "--quiet"]);
+    assert!(!text.contains("time"), "{text}");
+}
+
+#[test]
+fn the_name_of_a_machine_as_a_parameter_selects_no_machine() {
+    for name in ["linear_motor_center", "linear_motor_centre", "my_machine.yaml", "folder/machine"] {
+        let output = run(&["run", "x-constant", "--quiet", "--set", &format!("machine={name}")]);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success() && text.contains("--machine selects a machine"), "{name}: {text}");
+    }
+    let output = run(&["run", "x-constant", "--quiet", "--set", "machine=Shop floor 3"]);
+    assert!(output.stderr.is_empty());
+}
+
+#[test]
+fn a_tiny_linear_move_has_a_feed_in_meters_per_minute() {
+    let folder = TestFolder::new("tiny_move");
+    let file = folder.file("tiny.yaml", "description: d\nfeed_m_min: 6\nmoves:\n  - line: {x_mm: 1e-6}\n");
+    let file = file.to_str().expect("UTF-8");
+    assert!(printed(&["run", file, "--quiet"]).contains("feed 6.00 m/min not reached"));
+    let output = run(&["check", file]);
+    assert!(String::from_utf8_lossy(&output.stdout).contains("path: 0.000 mm"));
+}
+
+#[test]
 fn gains_of_0_are_part_of_the_verdict() {
     for name in ["position", "velocity", "current"] {
         let text = verdict("x-constant", &format!("x.{name}_loop.gain=0"));

@@ -1,5 +1,7 @@
 //! Steps: position cycles, parts of them, loads, preview.
 
+use virtual_axes_core::simulation::check_load;
+
 use crate::border::{BorderError, VaStatus, guard, numbers, reference_mut};
 use crate::machine::VaMachine;
 
@@ -79,6 +81,9 @@ pub unsafe extern "C" fn va_set_loads(machine: *mut VaMachine, loads: *const f64
         let machine = unsafe { reference_mut(machine, "machine") }?;
         // SAFETY: the caller promises this number of values.
         let loads = unsafe { numbers(loads, count, machine.axis_count(), "loads") }?;
+        for (index, &load) in loads.iter().enumerate() {
+            check_load(load).map_err(|error| BorderError::invalid(format!("loads[{index}] is {error}")))?;
+        }
         loads.iter().enumerate().for_each(|(axis, &load)| machine.machine.set_load(axis, load));
         Ok(())
     })

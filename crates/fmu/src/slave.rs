@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use virtual_axes_core::config::{Assignment, Parameters, Value, ValueSource, parse_assignment};
 use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters};
+use virtual_axes_core::simulation::check_load;
 
 use crate::signals::SignalReader;
 use crate::variables::{Causality, FmuType, FmuVariable, FmuVariables, VariableRole, text_value};
@@ -177,6 +178,9 @@ impl Slave {
         match setting {
             VariableSetting::Real(value) if !value.is_finite() => {
                 Err(format!("{name} is {value}; it must be finite"))
+            }
+            VariableSetting::Real(value) if matches!(variable.role, VariableRole::Load(_)) => {
+                check_load(value).map_err(|error| format!("{name} is {error}"))
             }
             _ => Ok(()),
         }

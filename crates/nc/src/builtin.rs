@@ -63,7 +63,19 @@ impl BuiltinProgram {
 pub fn open_program(name: &str) -> io::Result<ProgramReader> {
     match BuiltinProgram::find(name) {
         Some(program) => Ok(program.reader()),
-        None => Ok(ProgramReader::File(BufReader::new(File::open(name)?))),
+        None => {
+            let file = File::open(name).map_err(|error| match error.kind() {
+                io::ErrorKind::NotFound => {
+                    let names: Vec<&str> = BuiltinProgram::names().collect();
+                    io::Error::new(
+                        error.kind(),
+                        format!("{error}; built-in part programs are {}", names.join(", ")),
+                    )
+                }
+                _ => error,
+            })?;
+            Ok(ProgramReader::File(BufReader::new(file)))
+        }
     }
 }
 

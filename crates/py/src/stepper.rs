@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::machine::{AxisSample, Machine as CoreMachine, MachineParameters};
+use virtual_axes_core::simulation::check_load;
 use virtual_axes_core::units::seconds;
 
 use crate::convert::value_error;
@@ -195,6 +196,9 @@ impl Stepper {
 
     fn set_load(&mut self, load: PyReadonlyArrayDyn<'_, f64>) -> PyResult<()> {
         let loads = self.values("load", &load)?;
+        for &load in &loads {
+            check_load(load).map_err(|error| value_error(format!("load is {error}")))?;
+        }
         loads.into_iter().enumerate().for_each(|(axis, load)| self.machine.set_load(axis, load));
         Ok(())
     }
@@ -223,6 +227,9 @@ impl Stepper {
         let StepperState(saved) = state;
         if (saved.machines, saved.axes) != (self.machines, self.axes) {
             return Err(value_error("the state is that of another number of machines or axes"));
+        }
+        if saved.machine.periods() != self.machine.periods() {
+            return Err(value_error("the state is that of a machine with other periods"));
         }
         self.clone_from(saved);
         Ok(())

@@ -87,6 +87,19 @@ fn own_library() -> Result<PathBuf, String> {
     )
 }
 
+/// Returns true if the program headers of an ELF file for 64 bits, little endian, name an interpreter: only a program has
+/// one.
+fn has_elf_interpreter(elf: &[u8]) -> bool {
+    const INTERPRETER: u32 = 3;
+    let bytes = |at: usize| elf.get(at..).unwrap_or_default();
+    let half = |at: usize| bytes(at).first_chunk().map_or(0, |bytes| u16::from_le_bytes(*bytes)) as usize;
+    let start = bytes(32).first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+    let start = usize::try_from(start).unwrap_or(usize::MAX);
+    let (size, count) = (half(54), half(56));
+    let kind = |index: usize| bytes(start.saturating_add(index * size)).first_chunk().copied();
+    (0..count).any(|index| kind(index).map(u32::from_le_bytes) == Some(INTERPRETER))
+}
+
 /// Returns the folder of FMI 2.0 for a library, and the extension of its name.
 fn platform(library: &[u8]) -> Result<(&'static str, &'static str), String> {
     let half = |offset: usize| {
@@ -97,7 +110,11 @@ fn platform(library: &[u8]) -> Result<(&'static str, &'static str), String> {
         let bytes = library.get(offset..)?.first_chunk()?;
         Some(u32::from_le_bytes(*bytes))
     };
+    let not_shared = "it is a program, not a shared library".to_owned();
     let found = if library.starts_with(b"\x7fELF\x02\x01") {
+        if has_elf_interpreter(library) {
+            return Err(not_shared);
+        }
         match half(18) {
             Some(62) => Some(("linux64", "so")),
             Some(183) => Some(("aarch64-linux", "so")),
@@ -105,9 +122,18 @@ fn platform(library: &[u8]) -> Result<(&'static str, &'static str), String> {
         }
     } else if library.starts_with(b"MZ") {
         let header = word(60).map_or(0, |offset| offset as usize);
+        // The flag IMAGE_FILE_DLL of the characteristics.
+        if half(header.saturating_add(22)).is_some_and(|flags| flags & 0x2000 == 0) {
+            return Err(not_shared);
+        }
         (half(header.saturating_add(4)) == Some(0x8664)).then_some(("win64", "dll"))
     } else {
-        (word(0) == Some(0xfeed_facf)).then_some(("darwin64", "dylib"))
+        let is_mach = word(0) == Some(0xfeed_facf);
+        // The file type MH_DYLIB.
+        if is_mach && word(12) != Some(6) {
+            return Err(not_shared);
+        }
+        is_mach.then_some(("darwin64", "dylib"))
     };
     let found =
         found.ok_or("it is no shared library of Linux, Windows or macOS for 64-bit x86 or ARM processors")?;
@@ -133,10 +159,20 @@ mod tests {
     fn the_head_of_a_library_decides_its_folder() {
         let mut windows = library(b"MZ", 104, 0x8664);
         windows[60] = 100;
+        assert_eq!(platform(&windows), Err("it is a program, not a shared library".to_owned()));
+        windows[123] = 0x20;
         assert_eq!(platform(&windows), Ok(("win64", "dll")));
         assert_eq!(platform(&library(b"\x7fELF\x02\x01", 18, 62)), Ok(("linux64", "so")));
         assert_eq!(platform(&library(b"\x7fELF\x02\x01", 18, 183)), Ok(("aarch64-linux", "so")));
-        assert_eq!(platform(&library(&0xfeed_facf_u32.to_le_bytes(), 100, 0)), Ok(("darwin64", "dylib")));
+        assert_eq!(platform(&library(&0xfeed_facf_u32.to_le_bytes(), 12, 6)), Ok(("darwin64", "dylib")));
+        assert!(platform(&library(&0xfeed_facf_u32.to_le_bytes(), 12, 2)).is_err());
+    }
+
+    #[test]
+    fn a_program_is_no_library() {
+        let program = std::fs::read(std::env::current_exe().unwrap()).unwrap();
+        let error = platform(&program).unwrap_err();
+        assert_eq!(error, "it is a program, not a shared library");
     }
 
     #[test]

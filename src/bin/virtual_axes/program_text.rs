@@ -44,11 +44,11 @@ pub fn unreached_feed(program: &Program, axes: &[AxisConfig]) -> Option<String> 
     ))
 }
 
-/// Returns size and symbol of the unit of feeds: m/min if a linear axis moves, else rpm.
+/// Returns size and symbol of the unit of feeds: rpm if only rotary axes move, else m/min.
 fn feed_unit(axes: &[AxisConfig], ranges: &[[f64; 2]]) -> (f64, &'static str) {
-    let has_linear =
-        axes.iter().zip(ranges).any(|(axis, range)| axis.kind() == AxisKind::Linear && moves(range));
-    let units = AxisUnits::for_kind(if has_linear { AxisKind::Linear } else { AxisKind::Rotary });
+    let moves = |kind| axes.iter().zip(ranges).any(|(axis, range)| axis.kind() == kind && moves(range));
+    let is_rotary = moves(AxisKind::Rotary) && !moves(AxisKind::Linear);
+    let units = AxisUnits::for_kind(if is_rotary { AxisKind::Rotary } else { AxisKind::Linear });
     (units.speed, units.speed_name)
 }
 

@@ -89,7 +89,9 @@ pub fn run(arguments: &RunArguments) -> Result<String, Box<dyn Error>> {
             trial(arguments, &input, program.as_ref(), &parameters, &config)?;
         let feed =
             program.as_deref().and_then(|program| program_text::unreached_feed(program, config.axes()));
-        let slow = setpoints.slow_warning(config.axes()).filter(|_| program.is_none());
+        // A part program has no column of times.
+        let has_times = program.is_none() && !input.is_part_program();
+        let slow = setpoints.slow_warning(config.axes()).filter(|_| has_times);
         let input_notes = input.notes_on_limits(&config).into_iter().chain(input.gap_warning());
         runs.push(VariantRun {
             controller: variant::controller_name(&parameters),

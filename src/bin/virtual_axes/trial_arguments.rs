@@ -3,17 +3,18 @@
 use std::error::Error;
 use std::path::Path;
 
+use clap::builder::NonEmptyStringValueParser;
 use virtual_axes_core::config::{DEFAULT_MACHINE, Parameters};
 
 use crate::input::{CommandInput, must_not_replace};
 use crate::part_program_arguments::PartProgramArguments;
-use crate::variant;
+use crate::{print_error, variant};
 
 /// Machine and parameters.
 #[derive(Debug, clap::Args)]
 pub struct MachineArguments {
     /// Built-in machine or machine file.
-    #[arg(long, default_value = DEFAULT_MACHINE)]
+    #[arg(long, default_value = DEFAULT_MACHINE, value_parser = NonEmptyStringValueParser::new())]
     machine: String,
     /// Set a parameter, for example `kinematics.tool_length_mm=150`; can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -33,6 +34,7 @@ impl MachineArguments {
 
     /// Loads the machine with the parameters of `--set`.
     pub fn parameters(&self) -> Result<Parameters, Box<dyn Error>> {
+        warn_of_machine_names(&self.set);
         variant::parameters(&Parameters::load(&self.machine)?, None, &self.set, &[])
     }
 }
@@ -42,10 +44,10 @@ impl MachineArguments {
 pub struct TrialArguments {
     /// Built-in scenario or part program, scenario file, part program file (`.nc`, `.ngc`, …), or file with setpoints:
     /// CSV (`time,x,y,…` in s, m, rad), MCAP with a JointTrajectory, or YAML for `ros2 topic pub`.
-    #[arg(value_name = "SCENARIO|FILE")]
+    #[arg(value_name = "SCENARIO|FILE", value_parser = NonEmptyStringValueParser::new())]
     input: String,
     /// Built-in machine or machine file.
-    #[arg(long, default_value = DEFAULT_MACHINE)]
+    #[arg(long, default_value = DEFAULT_MACHINE, value_parser = NonEmptyStringValueParser::new())]
     pub machine: String,
     /// Set a parameter, for example `x.velocity_loop.gain=4.5`; can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -63,6 +65,7 @@ pub struct TrialArguments {
 impl TrialArguments {
     /// Loads the machine without the parameters of `--set`.
     pub fn machine(&self) -> Result<Parameters, Box<dyn Error>> {
+        warn_of_machine_names(&self.set);
         Ok(Parameters::load(&self.machine)?)
     }
 
@@ -74,5 +77,15 @@ impl TrialArguments {
     /// Opens the scenario, the part program or the file with setpoints.
     pub fn input(&self) -> Result<CommandInput, Box<dyn Error>> {
         CommandInput::open(&self.input, self.topic.as_deref())?.with_part_program(&self.part_program)
+    }
+}
+
+/// Warns of a parameter `machine` that is probably meant to select a machine.
+fn warn_of_machine_names(set: &[String]) {
+    let names = set.iter().filter_map(|text| text.split_once('=')).filter(|(key, _)| key.trim() == "machine");
+    for (_, name) in names.filter(|(_, name)| Parameters::names_machine(name)) {
+        print_error(&format!(
+            "warning: --set machine={name} sets the name only and changes no drive; --machine selects a machine"
+        ));
     }
 }

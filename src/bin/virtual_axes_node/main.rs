@@ -120,10 +120,10 @@ fn parameters(args: &RosArgs) -> Result<Parameters, Box<dyn std::error::Error>> 
     for source in args.parameters() {
         match source {
             ParameterSource::Value { name, text, .. } => {
-                if name == "machine" && Parameters::builtin_names().any(|shipped| shipped == text) {
+                if name == "machine" && Parameters::names_machine(text) {
                     tracing::warn!(
-                        "-p machine:={text} sets the name only and changes no drive; to simulate that machine, \
-                         pass its file with --params-file (`virtual_axes machines --show {text}` prints it)"
+                        "-p machine:={text} sets the name only and changes no drive; to simulate another machine, \
+                         pass its file with --params-file (`virtual_axes machines --show NAME` prints a built-in one)"
                     );
                 }
                 pending.push(parse_assignment(&format!("{name}:={text}"), &ValueSource::named("-p"))?);

@@ -64,6 +64,13 @@ impl Parameters {
         BUILTIN.iter().map(|(name, _)| *name)
     }
 
+    /// Returns true if `text` is or resembles the name of a built-in machine or of a machine file; as a value of the
+    /// parameter `machine`, which is a name only, it is probably meant to select that machine.
+    pub fn names_machine(text: &str) -> bool {
+        let is_file = text.contains('/') || text.ends_with(".yaml") || text.ends_with(".yml");
+        is_file || nearest_name(text, Self::builtin_names()).is_some()
+    }
+
     /// Returns the built-in machine `name`.
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::fit::{BoundedParameter, RANK};
+use super::fit::{BoundedParameter, RANK, pseudo_inverse};
 
 /// Returns the covariance of fitted values from the sums of the residuals over clusters, which are independent although
 /// the residuals within a cluster are not (sandwich estimator). Rows without cluster, such as priors, have no noise.
@@ -15,7 +15,7 @@ pub(super) fn clustered_covariance(
 ) -> Option<DMatrix<f64>> {
     let here = residuals(values)?;
     let (jacobian, scale) = scaled_jacobian(parameters, values, &residuals)?;
-    let bread = (jacobian.transpose() * &jacobian).pseudo_inverse(RANK).ok()?;
+    let bread = pseudo_inverse(jacobian.transpose() * &jacobian, RANK)?;
     let count = clusters.iter().flatten().max().map_or(0, |last| last + 1);
     let mut scores = vec![DVector::zeros(values.len()); count];
     for (row, cluster) in clusters.iter().enumerate().take(here.len()) {
@@ -43,7 +43,7 @@ pub(super) fn systematic_covariance(
 ) -> Option<DMatrix<f64>> {
     let squares = residuals(values)?.norm_squared();
     let (jacobian, scale) = scaled_jacobian(parameters, values, &residuals)?;
-    let inverse = (jacobian.transpose() * &jacobian).pseudo_inverse(RANK).ok()?;
+    let inverse = pseudo_inverse(jacobian.transpose() * &jacobian, RANK)?;
     Some(unscaled(inverse * squares, &scale))
 }
 

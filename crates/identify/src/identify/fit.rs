@@ -236,6 +236,14 @@ pub(super) fn fit_linear(rows: impl Iterator<Item = (Vec<f64>, f64, f64)>) -> Op
     Some(LinearFit { values: values.iter().copied().collect(), covariance: inverse * variance })
 }
 
+/// Returns the pseudo-inverse, without singular values up to `rank`; none of a matrix with elements that are not finite.
+pub(super) fn pseudo_inverse(matrix: DMatrix<f64>, rank: f64) -> Option<DMatrix<f64>> {
+    // The decomposition does not terminate with non-finite elements.
+    let is_finite = matrix.iter().all(|element| element.is_finite());
+    let svd = is_finite.then(|| matrix.try_svd(true, true, f64::EPSILON, SVD_ITERATIONS)).flatten()?;
+    svd.pseudo_inverse(rank).ok()
+}
+
 /// Returns the inverse of a symmetric matrix after scaling of its diagonal, or none if it is rank-deficient.
 pub(super) fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = matrix.diagonal().map(|d| 1.0 / d.sqrt());

@@ -83,6 +83,14 @@ pub(super) fn fit_transmission(
     if motions.is_empty() {
         return None;
     }
+    if motions.iter().all(TwoEncoderMotion::is_without_twist) {
+        findings.push(Finding::missing(
+            "no-wind-up",
+            "no transmission: motor_position equals position in all recordings, as that of a rigid axis or of one encoder",
+            "record the encoder of the load beside that of the motor",
+        ));
+        return None;
+    }
     for (k, signals) in recordings.iter().enumerate() {
         if let Some(first) = recordings[..k].iter().find(|other| other.spans == signals.spans) {
             let what =

@@ -233,6 +233,19 @@ fn a_rigid_axis_gets_no_transmission() {
 }
 
 #[test]
+fn a_motor_position_that_is_that_of_the_load_gets_no_transmission() {
+    let mut raw = recording(&true_parameters().machine_config().expect("a machine"), 20.0);
+    for scale in [0.0, 1e-15] {
+        raw.motor_position =
+            raw.position.as_ref().map(|load| load.iter().map(|x| x * (1.0 + scale)).collect());
+        let (found, _) = identified(&raw);
+        assert_eq!(found.transmission, None);
+        let text = found.findings.iter().find(|f| f.code == "no-wind-up").expect("a finding").to_string();
+        assert!(text.contains("motor_position equals position in all recordings"), "{text}");
+    }
+}
+
+#[test]
 fn without_a_current_only_the_antiresonance_and_the_backlash_are_known() {
     let raw = RawRecording { current: None, ..recording(&elastic(TRUTH), 60.0) };
     let (found, start) = identified(&raw);

@@ -21,7 +21,8 @@ pub(super) struct LineSource<R> {
     next: Place,
     /// End of the farthest line that was read, bytes.
     farthest: u64,
-    /// Number of lines that jumps may still repeat.
+    /// Number of lines that jumps may repeat, in all and from now on.
+    repeated_lines: u64,
     repeats_left: u64,
     /// Number of lines repeated since the last step of the program.
     idle_lines: u64,
@@ -30,9 +31,17 @@ pub(super) struct LineSource<R> {
 }
 
 impl<R: BufRead + Seek> LineSource<R> {
-    pub(super) fn new(reader: R, repeats: u64) -> Self {
+    pub(super) fn new(reader: R, repeated_lines: u64) -> Self {
         let next = Place { offset: 0, lines: 0 };
-        Self { reader, next, farthest: 0, repeats_left: repeats, idle_lines: 0, has_text: false }
+        Self {
+            reader,
+            next,
+            farthest: 0,
+            repeated_lines,
+            repeats_left: repeated_lines,
+            idle_lines: 0,
+            has_text: false,
+        }
     }
 
     /// Returns the number of the line that was read last, from 1.
@@ -76,9 +85,10 @@ impl<R: BufRead + Seek> LineSource<R> {
             return Err(format!("endless loop: {MAX_IDLE_LINES} repeated lines without motion or event"));
         }
         if self.repeats_left == 0 {
-            return Err(
-                "the loops of the program repeat too many lines: end the loop or raise the limit".to_owned()
-            );
+            return Err(format!(
+                "endless loop: the loops of the program repeat more than {} lines",
+                self.repeated_lines
+            ));
         }
         self.repeats_left -= 1;
         Ok(true)

@@ -54,6 +54,12 @@ impl OverrideSchedule {
         Self(vec![(0.0, factor)])
     }
 
+    /// Returns the highest feed override.
+    fn highest(&self) -> f64 {
+        let OverrideSchedule(points) = self;
+        points.iter().map(|(_, factor)| *factor).reduce(f64::max).unwrap_or(1.0)
+    }
+
     fn at(&self, time: f64) -> f64 {
         let OverrideSchedule(points) = self;
         points.iter().take_while(|(from, _)| *from <= time).last().map_or(1.0, |(_, value)| *value)
@@ -101,6 +107,8 @@ pub struct ProgramTrack {
     pub cycle_time: f64,
     /// Duration of all motions at their programmed feed, s.
     pub programmed_time: f64,
+    /// Duration of all dwells read, s.
+    pub dwell_time: f64,
     /// Farthest source line that was read, from 1.
     pub lines_read: usize,
     /// Ignored M codes of the lines read.
@@ -150,6 +158,7 @@ impl Iterator for NotedSteps<'_> {
                     track.merge_tolerance.get_or_insert(motion.line);
                 }
             }
+            Some(Ok(ProgramStep::Event { event: ProgramEvent::Dwell(time), .. })) => track.dwell_time += time,
             Some(Ok(ProgramStep::Event { line, event: ProgramEvent::Stop | ProgramEvent::OptionalStop })) => {
                 track.stop.get_or_insert(*line);
             }
@@ -199,6 +208,16 @@ impl<'a> PartProgramSource<'a> {
     }
 }
 
+impl PartProgramSource<'_> {
+    fn too_long(&self) -> SourceError {
+        let (name, hours, line) = (self.name, LONGEST / HOUR, self.track.borrow().lines_read);
+        format!(
+            "{name}:{line}: the program takes longer than {hours} h; end its loop, or check feed and dwell"
+        )
+        .into()
+    }
+}
+
 impl GridSource for PartProgramSource<'_> {
     fn joints(&self) -> &[usize] {
         self.planner.joints()
@@ -207,10 +226,7 @@ impl GridSource for PartProgramSource<'_> {
     fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError> {
         let time = seconds(self.cycle * self.period);
         if time > LONGEST {
-            let (name, hours, line) = (self.name, LONGEST / HOUR, self.track.borrow().lines_read);
-            return Err(
-                format!("{name}:{line}: the program takes longer than {hours} h; end its loop").into()
-            );
+            return Err(self.too_long());
         }
         let setpoint = self.planner.next_setpoint(self.schedule.at(time)).map_err(|error| match error {
             // The interpreter's error names the file.
@@ -219,6 +235,11 @@ impl GridSource for PartProgramSource<'_> {
         })?;
         let mut track = self.track.borrow_mut();
         track.programmed_time = self.planner.programmed_time();
+        // Motions ahead that alone take too long are not awaited.
+        if track.programmed_time / self.schedule.highest() + track.dwell_time > LONGEST {
+            drop(track);
+            return Err(self.too_long());
+        }
         let Some(setpoint) = setpoint else { return Ok(false) };
         row.copy_from_slice(setpoint.psec());
         track.setpoints.push_back(TrackPoint {

@@ -161,8 +161,11 @@ class Machine:
             raise ValueError(f"axis {unknown[0]!r} is unknown; known are {', '.join(self.axes)}")
         columns = {name: to_floats(f"psec of {name}", values) for name, values in psec.items()}
         shapes = {column.shape for column in columns.values()}
+        if not columns:
+            raise ValueError(f"psec has no columns; it needs one or more of {', '.join(self.axes)}")
         if len(shapes) != 1 or len(next(iter(shapes))) != 1:
-            raise ValueError(f"the columns of psec have the shapes {sorted(shapes)}; they need one common length")
+            found = ", ".join(f"{name} {column.shape}" for name, column in columns.items())
+            raise ValueError(f"the columns of psec have the shapes {found}; they need one common length")
         still = np.zeros(next(iter(shapes)))
         return self._checked(np.column_stack([columns.get(name, still) for name in self.axes]))
 

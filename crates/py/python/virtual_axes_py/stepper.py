@@ -87,7 +87,8 @@ class Stepper:
     def restore(self, state: _native.StepperState) -> None:
         """Returns to a saved state and its parameters.
 
-        Raises `ValueError` if it has another number of machines or axes.
+        The stepper then is the machine of the state. Raises `ValueError` if that has another number of machines or
+        axes, or other periods.
         """
         self._native.restore(state)
 

@@ -35,8 +35,13 @@ pub fn loops(axis: &AxisConfig, periods: &Periods) -> Vec<String> {
         Ok(model) if !has_stable_poles(&model) => Some(format!("the inner loops of {name} are unstable")),
         Ok(model) => {
             let stability = design_controller(axis, &model).and_then(|rst| check_stable(&model, &rst));
-            matches!(stability, Err(DesignError::Unstable { .. }))
-                .then(|| format!("the position loop of {name} is unstable"))
+            match stability {
+                Err(DesignError::Unstable { .. }) => Some(format!("the position loop of {name} is unstable")),
+                Err(_) => Some(format!(
+                    "the poles of the position loop of {name} cannot be computed; it can be unstable"
+                )),
+                Ok(()) => None,
+            }
         }
         Err(_) => None,
     };

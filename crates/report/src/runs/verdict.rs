@@ -19,6 +19,7 @@ fn single<P>(run: &SimulatedRun<P>) -> String {
     let main = main_figure(figures);
     let contour = figure::of_path(figures, false);
     let text = match contour.get(1) {
+        _ if figures.axes.iter().all(|axis| !axis.moves) => "no axis moves".to_owned(),
         Some(rms) if main.subject.is_empty() => {
             format!("contour error {} µm max, {} µm RMS", main.text(), rms.text())
         }

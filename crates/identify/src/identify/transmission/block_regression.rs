@@ -2,6 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::super::fit::pseudo_inverse;
+
 /// Relative singular value below which a combination of columns has no influence.
 const RANK: f64 = 1e-12;
 
@@ -67,7 +69,7 @@ impl BlockRegression {
                 normal[(i, j)] *= scale[i] * scale[j];
             }
         }
-        let solution = normal.pseudo_inverse(RANK).ok()? * right;
+        let solution = pseudo_inverse(normal, RANK)? * right;
         let solution = solution.component_mul(&scale);
         solution.iter().all(|x| x.is_finite()).then_some(solution)
     }
@@ -84,8 +86,8 @@ impl BlockRegression {
         // Column `column` on the others.
         let others = normal.clone().remove_row(column).remove_column(column);
         let with = normal.column(column).clone_owned().remove_row(column);
-        match others.pseudo_inverse(RANK) {
-            Ok(inverse) if normal[(column, column)] > 0.0 => (1.0 - with.dot(&(inverse * &with))).max(0.0),
+        match pseudo_inverse(others, RANK) {
+            Some(inverse) if normal[(column, column)] > 0.0 => (1.0 - with.dot(&(inverse * &with))).max(0.0),
             _ => 0.0,
         }
     }
@@ -118,6 +120,20 @@ pub(super) fn scatter(without: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rows_of_any_size_end_without_a_solution_or_with_finite_coefficients() {
+        for size in [0.0, 1e-170, 1e-160, 1e160, 1e300, f64::NAN, f64::INFINITY] {
+            let mut regression = BlockRegression::new(3, 10);
+            for k in 0..1000 {
+                let x = f64::from(k) / 100.0;
+                regression.add(k as usize / 100, &[1.0, size * x, size * x.sin()], 2.0 + 3.0 * x);
+            }
+            let solution = regression.solve(3, None);
+            assert!(solution.is_none_or(|solution| solution.iter().all(|c| c.is_finite())), "{size}");
+            assert!((0.0..=1.0).contains(&regression.independence(3, 1)), "{size}");
+        }
+    }
 
     #[test]
     fn a_line_is_found_and_its_error_is_the_noise() {

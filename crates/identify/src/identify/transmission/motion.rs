@@ -83,6 +83,12 @@ impl TwoEncoderMotion {
         })
     }
 
+    /// Returns true if the positions of motor and load differ by rounding errors only.
+    pub fn is_without_twist(&self) -> bool {
+        let range = self.load.value.iter().fold(0.0_f64, |most, x| most.max((x - self.load.value[0]).abs()));
+        self.twist.iter().all(|twist| twist.abs() <= ROUNDING * range)
+    }
+
     /// Returns the motion with a twist at the instants of the load's position, which is older than that of the motor by
     /// `delay` seconds.
     pub fn without_delay(&self, delay: f64) -> Self {
