@@ -56,7 +56,7 @@ fn a_slow_part_program_has_no_doubtful_time() {
 
 #[test]
 fn the_name_of_a_machine_as_a_parameter_selects_no_machine() {
-    for name in ["linear_motor_center", "linear_motor_centre", "my_machine.yaml", "folder/machine"] {
+    for name in ["linear_motor_center", "linear_motor_centr", "my_machine.yaml", "folder/machine"] {
         let output = run(&["run", "x-constant", "--quiet", "--set", &format!("machine={name}")]);
         let text = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.success() && text.contains("--machine selects a machine"), "{name}: {text}");
