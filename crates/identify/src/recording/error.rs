@@ -32,7 +32,9 @@ pub enum ConditioningError {
         wanted: usize,
     },
     /// Recording without position.
-    #[error("{name}: no position was recorded; name its column by position=COLUMN[UNIT]")]
+    #[error(
+        "{name}: no position was recorded, or none of its values is a number; name its column by position=COLUMN[UNIT]"
+    )]
     NoPosition {
         /// Name of the recording.
         name: String,

@@ -93,6 +93,14 @@ pub(super) fn usable_columns(raw: &RawRecording, findings: &mut Vec<Finding>) ->
             findings.push(Finding::warning("channel-dropped", what, "record the channel completely"));
             continue;
         }
+        let impossible = values.iter().filter(|value| value.abs() > LARGEST).count();
+        if impossible > 0 {
+            let what = format!(
+                "{}: values of the {} beyond ±10¹⁵, {impossible} in all, count as missing",
+                raw.name, NAMES[n]
+            );
+            findings.push(Finding::warning("impossible-values", what, "check the format of the recording"));
+        }
         let finite = |value: &f64| if value.abs() <= LARGEST { *value } else { f64::NAN };
         columns[n] = Some(values.iter().map(finite).collect());
     }

@@ -335,6 +335,20 @@ fn missing_values_are_interpolated_or_split_the_recording() {
 }
 
 #[test]
+fn impossible_values_are_reported_and_interpolated() {
+    let mut raw = recording();
+    let wanted = run(&raw).0;
+    raw.position.as_mut().expect("a position")[3000] = 1e200;
+    raw.current.as_mut().expect("a current")[4000] = f64::NEG_INFINITY;
+    let (signals, findings) = run(&raw);
+    assert_eq!(codes(&findings), ["impossible-values", "impossible-values", "bridged"]);
+    assert!(
+        findings[0].to_string().contains("values of the position beyond ±10¹⁵, 1 in all, count as missing")
+    );
+    assert!((signals.spans[0].position[3000] - wanted.spans[0].position[3000]).abs() < 1e-7);
+}
+
+#[test]
 fn repeated_stamps_are_dropped_and_late_stamps_sorted() {
     let mut raw = recording();
     let wanted = raw.clone();
