@@ -62,6 +62,15 @@ fn commas_in_assignments_are_explained() {
 }
 
 #[test]
+fn an_unknown_option_is_not_suggested_as_a_value() {
+    for arguments in [["psec", "ballbar", "--axis", "x"], ["robustness", "ballbar", "--deviation", "0.1"]] {
+        let output = run(&arguments);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(message.contains("unexpected argument '--") && !message.contains("tip"), "{message}");
+    }
+}
+
+#[test]
 fn a_syntax_error_of_yaml_has_no_list_of_formats() {
     let folder = TestFolder::new("syntax_error");
     let file = folder.file("a.yaml", "moves:\n- {x: 1}\nmoves: 2\n");

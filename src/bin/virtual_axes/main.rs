@@ -57,6 +57,7 @@ use std::fmt::Display;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
+use clap::error::ContextKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use virtual_axes_core::config::listing;
@@ -175,7 +176,11 @@ fn main() -> ExitCode {
 
 /// Parses the command line; ends the process for `--help`, `--version` and invalid arguments.
 fn command_line() -> CommandLine {
-    CommandLine::try_parse().unwrap_or_else(|error| {
+    CommandLine::try_parse().unwrap_or_else(|mut error| {
+        // No name of a file or a scenario begins with a dash.
+        if error.render().to_string().contains("as a value, use '-- --") {
+            error.remove(ContextKind::Suggested);
+        }
         let text = error.render().to_string();
         if error.use_stderr() && text.chars().any(|c| c != '\n' && is_control(c)) {
             print_error(text.trim_end());
