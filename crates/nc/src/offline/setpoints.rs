@@ -57,7 +57,7 @@ impl OverrideSchedule {
     /// Returns the highest feed override.
     fn highest(&self) -> f64 {
         let OverrideSchedule(points) = self;
-        points.iter().map(|(_, factor)| *factor).reduce(f64::max).unwrap_or(1.0)
+        points.iter().map(|(_, factor)| *factor).fold(self.at(0.0), f64::max)
     }
 
     fn at(&self, time: f64) -> f64 {
@@ -263,6 +263,9 @@ mod tests {
         let values = [0.0, 2.4, 2.5, 3.9, 4.0, 100.0].map(|time| schedule.at(time));
         assert_eq!(values, [1.0, 1.0, 0.0, 0.0, 1.2, 1.2]);
         assert_eq!(OverrideSchedule::parse("50").unwrap().at(7.0), 0.5);
+        for (text, highest) in [("50", 0.5), ("0:50,1:120", 1.2), ("2:50", 1.0)] {
+            assert_eq!(OverrideSchedule::parse(text).unwrap().highest(), highest, "{text}");
+        }
         assert_eq!(OverrideSchedule::default().at(7.0), 1.0);
         for text in ["", "x", "201", "-1", "1:50,1:60", "0:100,5:0", "nan", "1:2:3"] {
             assert!(OverrideSchedule::parse(text).is_err(), "{text}");
