@@ -55,9 +55,9 @@ def lines(process: Node) -> list[re.Match[str]]:
 
 def test_levels_logger_and_time(start: Callable[..., AxesClient]):
     """INFO 20, WARN 30, ERROR 40, with the logger name that rclpy uses for this node, also for late joiners."""
+    began = time.time()
     drive = start(*IN_THE_CELL, "-p", "time:=fast", name="/cell/mill")
     process = drive.process
-    began = time.time()
     drive.node.create_publisher(Clock, "/clock", 10)
     drive.wait_for(lambda: "another node publishes it" in process.output(), 5, "log of another clock")
     reject_one(drive)

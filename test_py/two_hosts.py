@@ -27,7 +27,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from node_process import die_with_parent  # noqa: E402
-from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory  # noqa: E402
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, to_ns  # noqa: E402
 
 NODE_ADDRESS, CLIENT_ADDRESS = "10.79.0.1", "10.79.0.2"
 PATIENCE_S = 150.0
@@ -173,7 +173,14 @@ def watch(drive: AxesClient, seconds: float) -> dict[str, int]:
 
 def move(drive: AxesClient, points: int) -> None:
     """Executes a short trajectory; then submits one of `points` points, at 0.5 s each, and stops it."""
-    recording = drive.run(joint_trajectory(["x"], [0.0, 1.0], [[0.0], [0.01]]), settle=0.5)
+    # The node sends its decision again when it has discovered the client's reader, which takes longer if datagrams are
+    # lost.
+    accepted = drive.accept(joint_trajectory(["x"], [0.0, 1.0], [[0.0], [0.01]]), ACCEPTANCE_S)
+    drive.end(accepted.sequence_number, PATIENCE_S / 2)
+    start = to_ns(accepted.start)
+    end = start + round(1.5 * NANOSECONDS)
+    drive.wait_until(end, PATIENCE_S / 2)
+    recording = drive.record(start, end)
     gaps = [gap for gap in recording.joints.stamp[1:] - recording.joints.stamp[:-1] if gap != TSP_NS]
     write(position=drive.latest()["x"], gaps=len(gaps))
     began = time.monotonic()
