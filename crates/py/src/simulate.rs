@@ -164,10 +164,7 @@ fn run(
         trial::run(&trial, source, callback)
     };
     let outcome = outcome.map_err(|error| signals.error(error))?;
-    let part = part.map(|(mut lines, track, name)| {
-        lines.finish_cycles();
-        lines.figures(&name, &track)
-    });
+    let part = part.map(|(lines, track, name)| lines.finish(&name, &track, |_| {}));
     Ok((outcome, part.transpose()?))
 }
 

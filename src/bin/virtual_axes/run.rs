@@ -171,9 +171,9 @@ fn trial(
         trace.finish()?;
     }
     let part_program = match lines {
-        Some(mut lines) => {
-            lines.finish_cycles().iter().for_each(|cycle| feed.add(cycle));
-            let figures = lines.figures(input.name(), &input.track().borrow())?;
+        Some(lines) => {
+            let track = input.track().borrow();
+            let figures = lines.finish(input.name(), &track, |cycle| feed.add(cycle))?;
             Some(ProgramReport { figures, feed })
         }
         None => None,

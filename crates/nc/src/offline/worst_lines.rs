@@ -274,20 +274,22 @@ impl LineErrors {
         }
     }
 
-    /// Evaluates the last position cycles, in their order.
-    pub fn finish_cycles(&mut self) -> Vec<CycleError> {
-        let cycles = (0..self.poses.len()).filter_map(|_| self.evaluate()).collect();
-        self.explain(0);
-        cycles
-    }
-
-    /// Returns the figures of the program with the texts of the lines from the file `name`; `track` has its times. Call it
-    /// after [`finish_cycles`](Self::finish_cycles).
+    /// Evaluates the last position cycles, calls `visit` with each, and returns the figures of the program with the texts of
+    /// the lines from the file `name`; `track` has its times.
     ///
     /// # Errors
     ///
     /// Returns an error if the file cannot be read.
-    pub fn figures(self, name: &str, track: &ProgramTrack) -> io::Result<ProgramFigures> {
+    pub fn finish(
+        mut self,
+        name: &str,
+        track: &ProgramTrack,
+        mut visit: impl FnMut(&CycleError),
+    ) -> io::Result<ProgramFigures> {
+        while !self.poses.is_empty() {
+            self.evaluate().iter().for_each(&mut visit);
+        }
+        self.explain(0);
         let mut worst: Vec<WorstLine> = self.worst.into_iter().map(|(worst, _)| worst).collect();
         let last = worst.iter().map(|worst| worst.line).max().unwrap_or(0);
         for (i, text) in open_program(name)?.split(b'\n').take(last).enumerate() {
