@@ -146,6 +146,10 @@ def test_a_part_program_runs_as_by_the_command(machine: va.Machine) -> None:
         assert run.figures["axes"] == expected["axes"]
         assert run.figures["part_program"] == expected["part_program"]
         assert len(run.figures["part_program"]["worst_lines"]) == 10
+        page = run.report()
+        worst = run.figures["part_program"]["worst_lines"][0]
+        assert "Lines with the largest contour errors" in page and "Feed along the path" in page
+        assert f"{worst['contour_error_um']:.2f}" in page
     assert "part_program" not in machine.simulate(va.nc_program(program), figures="axes").figures
     with pytest.raises(ValueError, match="circle-diamond-square: is a part program; load it with nc_program"):
         va.scenario("circle-diamond-square")

@@ -14,7 +14,9 @@ use virtual_axes_core::trial::{
 };
 use virtual_axes_io::files::{figures_json, part_program_json, trace_writer};
 use virtual_axes_nc::offline::{LineErrors, ProgramFigures, ProgramTrack};
-use virtual_axes_report::runs::{SimulatedRun, SimulationPage, controller_name};
+use virtual_axes_report::runs::{
+    FeedAlongPath, ProgramReport, SimulatedRun, SimulationPage, controller_name,
+};
 
 use crate::convert::{check_signals, value_error};
 use crate::machine::PyMachine;
@@ -220,20 +222,31 @@ pub fn report(
     psec: &Given<'_>,
     (title, description): (&str, &str),
 ) -> PyResult<String> {
-    let prepared = psec.prepare(py, machine)?;
+    let mut prepared = psec.prepare(py, machine)?;
     py.detach(|| {
         let mut signals = SignalCheck::new();
+        let mut part =
+            prepared.part.take().map(|(track, name)| (LineErrors::new(&machine.config), track, name));
+        let mut feed = FeedAlongPath::default();
+        let callback = |tick: Tick<'_>| {
+            if let Some((lines, track, _)) = &mut part {
+                lines.add(&tick, track).iter().for_each(|cycle| feed.add(cycle));
+            }
+            if tick.position_instant { signals.cycle() } else { Ok(()) }
+        };
         let trial = prepared.trial(machine, Measures::ALL, true);
-        let outcome = trial::run(&trial, prepared.source(), |_| signals.cycle())
-            .map_err(|error| signals.error(error))?;
-        let run = SimulatedRun::<()> {
+        let outcome =
+            trial::run(&trial, prepared.source(), callback).map_err(|error| signals.error(error))?;
+        let part = part.map(|(lines, track, name)| lines.finish(&name, &track, |cycle| feed.add(cycle)));
+        let part_program = part.transpose()?.map(|figures| ProgramReport { figures, feed });
+        let run = SimulatedRun {
             controller: controller_name(&machine.parameters),
             changes: Vec::new(),
             shared_changes: 0,
             machine: machine.config.clone(),
             input_warnings: Vec::new(),
             input_notes: Vec::new(),
-            part_program: None,
+            part_program,
             outcome,
         };
         let program = format!("virtual_axes_py {}", env!("CARGO_PKG_VERSION"));

@@ -2,12 +2,12 @@
 
 use serde_json::{Map, Value, json};
 use virtual_axes_io::files::{figures_json, part_program_json};
+use virtual_axes_report::runs::SimulatedRun;
 
 use crate::input::CommandInput;
-use crate::variant::VariantRun;
 
 /// Returns the runs of a command as a JSON object.
-pub fn object(input: &CommandInput, machine: &str, runs: &[VariantRun]) -> Value {
+pub fn object(input: &CommandInput, machine: &str, runs: &[SimulatedRun]) -> Value {
     json!({
         "input": input.name(),
         "description": input.description(),
@@ -16,7 +16,7 @@ pub fn object(input: &CommandInput, machine: &str, runs: &[VariantRun]) -> Value
     })
 }
 
-fn run(run: &VariantRun) -> Value {
+fn run(run: &SimulatedRun) -> Value {
     let mut object = Map::new();
     object.insert("controller".to_owned(), json!(run.controller));
     object.insert("changes".to_owned(), json!(run.changes));

@@ -10,6 +10,7 @@ use virtual_axes_identify::learn::{
     LearningEnd, LearningError, LearningOptions, LearningResult, MAX_ITERATIONS, learn,
 };
 use virtual_axes_io::files::psec_writer;
+use virtual_axes_report::runs::SimulatedRun;
 
 use crate::input::CommandInput;
 use crate::output_arguments::{OutputArguments, OutputFormat};
@@ -17,7 +18,7 @@ use crate::progress::SearchProgress;
 use crate::report::ReportMachine;
 use crate::search::read_workload;
 use crate::trial_arguments::TrialArguments;
-use crate::variant::{self, ControllerName, VariantRun};
+use crate::variant::{self, ControllerName};
 use crate::{interrupt, learn_output as output, program_text, report};
 
 /// One micrometer or microradian.
@@ -186,7 +187,7 @@ fn write_report(
     parameters: &Parameters,
     learned: &output::Learned<'_>,
 ) -> Result<(), Box<dyn Error>> {
-    let run = |name: String, outcome: &TrialOutcome| VariantRun {
+    let run = |name: String, outcome: &TrialOutcome| SimulatedRun {
         controller: variant::controller_name(parameters),
         changes: vec![name],
         shared_changes: 0,

@@ -6,11 +6,10 @@ use std::path::Path;
 use time::OffsetDateTime;
 use virtual_axes_core::config::Parameters;
 use virtual_axes_io::files::OutputFile;
-use virtual_axes_report::runs::SimulationPage;
+use virtual_axes_report::runs::{SimulatedRun, SimulationPage};
 use virtual_axes_report::{Scatter, Section};
 
 use crate::input::CommandInput;
-use crate::variant::VariantRun;
 
 /// Rejects a file name with another extension than `.html` or `.htm`. Devices and pipes have no extension.
 pub fn check_name(path: &Path) -> Result<(), String> {
@@ -31,7 +30,7 @@ pub fn write(
     path: &Path,
     input: &CommandInput,
     machine: &ReportMachine,
-    runs: &[VariantRun],
+    runs: &[SimulatedRun],
     scatters: &[Scatter],
 ) -> Result<(), Box<dyn Error>> {
     write_with_sections(path, input, machine, runs, scatters, Vec::new())
@@ -42,7 +41,7 @@ pub fn write_with_sections(
     path: &Path,
     input: &CommandInput,
     machine: &ReportMachine,
-    runs: &[VariantRun],
+    runs: &[SimulatedRun],
     scatters: &[Scatter],
     sections: Vec<Section>,
 ) -> Result<(), Box<dyn Error>> {
@@ -51,22 +50,13 @@ pub fn write_with_sections(
         description: input.description(),
         machine: &machine.title,
         runs,
-        sections: sections
-            .into_iter()
-            .chain(runs.iter().filter_map(|run| part_program(run, runs.len())))
-            .collect(),
+        sections,
         scatters,
         provenance: provenance(machine),
     };
     let mut file = OutputFile::create(path)?;
     page.write(&mut file)?;
     Ok(file.finish()?)
-}
-
-/// Returns the section of a part program; its heading has the title of the run if there are several.
-fn part_program(run: &VariantRun, runs: usize) -> Option<Section> {
-    let heading = if runs > 1 { format!("Part program: {}", run.title()) } else { "Part program".to_owned() };
-    run.part_program.as_ref().map(|program| program.section(&heading))
 }
 
 /// Machine of a report.

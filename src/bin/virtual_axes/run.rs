@@ -13,17 +13,15 @@ use virtual_axes_core::trial::{Measures, Tick, Trial, TrialOutcome};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_io::files::{TraceWriter, trace_writer};
 use virtual_axes_nc::offline::LineErrors;
-use virtual_axes_report::runs::{figure, table, verdict};
+use virtual_axes_report::runs::{FeedAlongPath, ProgramReport, SimulatedRun, figure, table, verdict};
 
-use crate::feed_along_path::FeedAlongPath;
 use crate::input::CommandInput;
 use crate::output_arguments::{OutputArguments, OutputFormat};
 use crate::period::PeriodArgument;
-use crate::program_report::ProgramReport;
 use crate::report::ReportMachine;
 use crate::setpoint_summary::SetpointSummary;
 use crate::trial_arguments::TrialArguments;
-use crate::variant::{self, ControllerName, VariantRun};
+use crate::variant::{self, ControllerName};
 use crate::{interrupt, json, program_text, report, text_table};
 
 /// Arguments of `virtual_axes run`.
@@ -93,7 +91,7 @@ pub fn run(arguments: &RunArguments) -> Result<String, Box<dyn Error>> {
         let has_times = program.is_none() && !input.is_part_program();
         let slow = setpoints.slow_warning(config.axes()).filter(|_| has_times);
         let input_notes = input.notes_on_limits(&config).into_iter().chain(input.gap_warning());
-        runs.push(VariantRun {
+        runs.push(SimulatedRun {
             controller: variant::controller_name(&parameters),
             changes,
             shared_changes: arguments.trial.set.len(),
@@ -220,7 +218,7 @@ impl TraceRecorder {
 }
 
 /// Returns the verdict and the tables of the runs: a row per axis of a single run, a column per run of several.
-fn text(runs: &[VariantRun]) -> String {
+fn text(runs: &[SimulatedRun]) -> String {
     let verdict = verdict::lines(runs).into_iter().map(|line| text_table::wrapped_line(&escaped(&line)));
     let mut parts = vec![verdict.collect::<String>()];
     match runs {
@@ -230,7 +228,7 @@ fn text(runs: &[VariantRun]) -> String {
     parts.join("\n")
 }
 
-fn single(run: &VariantRun) -> Vec<String> {
+fn single(run: &SimulatedRun) -> Vec<String> {
     let figures = &run.outcome.figures;
     let mut axes = text_table::text(&table::axes(figures));
     let verdict = verdict::lines(std::slice::from_ref(run)).concat();
@@ -238,15 +236,21 @@ fn single(run: &VariantRun) -> Vec<String> {
     axes.extend(remarks.map(|remark| text_table::wrapped_line(&remark)));
     let path = table::path(figures);
     let path = (!path.rows.is_empty()).then(|| format!("{}{}\n", text_table::text(&path), table::SAMPLING));
-    let program = run.part_program.as_ref().map(ProgramReport::text);
+    let program = run.part_program.as_ref().map(part_program_text);
     std::iter::once(axes).chain(path).chain(program).collect()
 }
 
-fn several(runs: &[VariantRun]) -> Vec<String> {
+/// Returns the times of a part program and a table of its worst lines.
+fn part_program_text(program: &ProgramReport) -> String {
+    let table = text_table::aligned(&program.worst_table(escaped), &[1, 2]);
+    text_table::wrapped_line(&program.times()) + &table
+}
+
+fn several(runs: &[SimulatedRun]) -> Vec<String> {
     let mut parts = Vec::new();
     for mut table in table::comparison(runs).into_iter().filter(|table| !table.rows.is_empty()) {
         let (head, values) = (2, table.columns.split_off(2));
-        let most = text_table::columns_beside_text(runs.iter().map(VariantRun::title));
+        let most = text_table::columns_beside_text(runs.iter().map(SimulatedRun::title));
         for (index, columns) in values.chunks(most).enumerate() {
             let first = head + index * most;
             let mut part = table.clone();
@@ -258,7 +262,7 @@ fn several(runs: &[VariantRun]) -> Vec<String> {
             parts.push(text_table::aligned(&part, &[0, 1]));
         }
     }
-    let all: Vec<Vec<String>> = runs.iter().map(VariantRun::remarks).collect();
+    let all: Vec<Vec<String>> = runs.iter().map(SimulatedRun::remarks).collect();
     let remarks: Vec<String> = match all.split_first() {
         Some((first, others)) if others.iter().all(|other| other == first) => first.clone(),
         _ => runs
@@ -276,7 +280,7 @@ fn several(runs: &[VariantRun]) -> Vec<String> {
 }
 
 /// Returns all figures as CSV, a row per run and figure.
-fn csv(runs: &[VariantRun]) -> String {
+fn csv(runs: &[SimulatedRun]) -> String {
     let mut text = "run,figure,value,unit\n".to_owned();
     for run in runs {
         let figures = &run.outcome.figures;

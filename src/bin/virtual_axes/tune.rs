@@ -9,6 +9,7 @@ use virtual_axes_identify::tune::{
     Cost, MarginLimits, TuneError, Tuning, TuningProblem, TuningResult, TuningSearch, Workload,
 };
 use virtual_axes_io::files::tuning_json;
+use virtual_axes_report::runs::SimulatedRun;
 
 use crate::input::{CommandInput, must_not_replace};
 use crate::output_arguments::{OutputArguments, OutputFormat};
@@ -16,7 +17,6 @@ use crate::progress::SearchProgress;
 use crate::report::ReportMachine;
 use crate::search::{name_error, read_workload};
 use crate::trial_arguments::TrialArguments;
-use crate::variant::VariantRun;
 use crate::{machine_file, program_text, report, tune_output as output, variant};
 
 /// Maximum of `--designs`, about an hour of computation.
@@ -260,8 +260,8 @@ fn record(
     workload: &Workload,
     problem: &TuningProblem<'_>,
     found: &TuningResult,
-) -> Result<[VariantRun; 2], TuneError> {
-    let run = |tuning: &Tuning| -> Result<VariantRun, TuneError> {
+) -> Result<[SimulatedRun; 2], TuneError> {
+    let run = |tuning: &Tuning| -> Result<SimulatedRun, TuneError> {
         // Controller of the tuned axes.
         let controller = match tuning {
             Tuning::Present | Tuning::ContourGain(_) => variant::controller_name(problem.parameters()),
@@ -269,7 +269,7 @@ fn record(
             Tuning::Cascade(_) => "cascade".to_owned(),
         };
         let outcome = problem.record_on(workload, tuning)?;
-        Ok(VariantRun {
+        Ok(SimulatedRun {
             controller,
             changes: vec![match tuning {
                 Tuning::Present => "initial".to_owned(),

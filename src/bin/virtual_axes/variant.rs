@@ -2,12 +2,10 @@
 
 use std::error::Error;
 
-use crate::program_report::ProgramReport;
 use virtual_axes_core::config::{
     Assignment, ConfigError, MachineConfig, Parameters, Value, ValueSource, parse_assignment,
 };
 use virtual_axes_core::machine::MachineParameters;
-use virtual_axes_report::runs::SimulatedRun;
 pub use virtual_axes_report::runs::controller_name;
 
 /// Position controller of a run.
@@ -106,6 +104,3 @@ pub fn checked(
     })?;
     Ok(config)
 }
-
-/// One run of a command with its variant of the machine.
-pub type VariantRun = SimulatedRun<ProgramReport>;

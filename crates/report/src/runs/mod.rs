@@ -6,9 +6,13 @@ pub mod table;
 pub mod verdict;
 
 mod axis_units;
+mod feed_along_path;
 mod page;
+mod program_report;
 mod simulated_run;
 
 pub use axis_units::AxisUnits;
+pub use feed_along_path::FeedAlongPath;
 pub use page::SimulationPage;
+pub use program_report::ProgramReport;
 pub use simulated_run::{SimulatedRun, controller_name};

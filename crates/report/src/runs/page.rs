@@ -11,7 +11,7 @@ use crate::{Report, ReportRun, Scatter, Section};
 
 /// Contents of the page of one or several simulated runs of one trial.
 #[derive(Debug)]
-pub struct SimulationPage<'a, P = ()> {
+pub struct SimulationPage<'a> {
     /// Name of the trial.
     pub title: &'a str,
     /// Description of the trial; can be empty.
@@ -19,8 +19,8 @@ pub struct SimulationPage<'a, P = ()> {
     /// Name of the machine.
     pub machine: &'a str,
     /// Runs, the first of which the others are compared with.
-    pub runs: &'a [SimulatedRun<P>],
-    /// Sections below the figures, such as that of a part program.
+    pub runs: &'a [SimulatedRun],
+    /// Sections below the figures, before those of part programs.
     pub sections: Vec<Section>,
     /// Scatter plots of a search.
     pub scatters: &'a [Scatter],
@@ -28,7 +28,7 @@ pub struct SimulationPage<'a, P = ()> {
     pub provenance: Vec<(String, String)>,
 }
 
-impl<P> SimulationPage<'_, P> {
+impl SimulationPage<'_> {
     /// Writes the page as HTML. Equal runs give equal bytes.
     ///
     /// # Errors
@@ -36,7 +36,7 @@ impl<P> SimulationPage<'_, P> {
     pub fn write(&self, output: &mut impl Write) -> io::Result<()> {
         let titles: Vec<String> = self.runs.iter().map(SimulatedRun::title).collect();
         let empty = SignalRecording::default();
-        let run = |(run, title): (&SimulatedRun<P>, &'_ String)| (facts(self.machine, run), title.clone());
+        let run = |(run, title): (&SimulatedRun, &'_ String)| (facts(self.machine, run), title.clone());
         let described: Vec<(Vec<(String, String)>, String)> =
             self.runs.iter().zip(&titles).map(run).collect();
         let report = Report {
@@ -58,15 +58,24 @@ impl<P> SimulationPage<'_, P> {
                     recording: run.outcome.recording.as_ref().unwrap_or(&empty),
                 })
                 .collect(),
-            sections: self.sections.clone(),
+            sections: self.sections.iter().cloned().chain(self.part_programs()).collect(),
             provenance: self.provenance.clone(),
         };
         report.write_with(self.scatters, output)
     }
+
+    /// Returns the sections of part programs; their headings have the titles of the runs if there are several.
+    fn part_programs(&self) -> impl Iterator<Item = Section> {
+        let heading = |run: &SimulatedRun| match self.runs.len() {
+            1 => "Part program".to_owned(),
+            _ => format!("Part program: {}", run.title()),
+        };
+        self.runs.iter().filter_map(move |run| Some(run.part_program.as_ref()?.section(&heading(run))))
+    }
 }
 
 /// Returns machine, controller and changed parameters of a run, and remarks on it.
-fn facts<P>(machine: &str, run: &SimulatedRun<P>) -> Vec<(String, String)> {
+fn facts(machine: &str, run: &SimulatedRun) -> Vec<(String, String)> {
     let figures = &run.outcome.figures;
     let mut facts =
         vec![("machine".to_owned(), machine.to_owned()), ("controller".to_owned(), run.controller.clone())];

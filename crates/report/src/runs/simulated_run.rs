@@ -3,7 +3,7 @@
 use virtual_axes_core::config::{MachineConfig, Parameters, Value};
 use virtual_axes_core::trial::TrialOutcome;
 
-use super::{axis_warnings, table};
+use super::{ProgramReport, axis_warnings, table};
 
 /// Returns the name of the controller of the axes, or several names joined by `+`.
 pub fn controller_name(parameters: &Parameters) -> String {
@@ -24,9 +24,9 @@ pub fn controller_name(parameters: &Parameters) -> String {
     }
 }
 
-/// Simulated run with its variant of the machine. `P` are the figures of a part program.
+/// Simulated run with its variant of the machine.
 #[derive(Debug)]
-pub struct SimulatedRun<P = ()> {
+pub struct SimulatedRun {
     /// Name of the controller.
     pub controller: String,
     /// Changed parameters of all runs, then of this run, in the syntax of the command line.
@@ -39,13 +39,13 @@ pub struct SimulatedRun<P = ()> {
     pub input_warnings: Vec<String>,
     /// Notes on the input, such as a limit without effect.
     pub input_notes: Vec<String>,
-    /// Times and worst lines of a part program.
-    pub part_program: Option<P>,
+    /// Times, worst lines and feed of a part program.
+    pub part_program: Option<ProgramReport>,
     /// Result of the run.
     pub outcome: TrialOutcome,
 }
 
-impl<P> SimulatedRun<P> {
+impl SimulatedRun {
     /// Returns the title that distinguishes the run from the others.
     pub fn title(&self) -> String {
         let mut title = self.controller.clone();
@@ -55,6 +55,7 @@ impl<P> SimulatedRun<P> {
         }
         title
     }
+
     /// Returns remarks on the run, one per line.
     pub fn remarks(&self) -> Vec<String> {
         let unit = "the unit of position_loop.gain is (m/min)/mm or (1000 °/min)/°, 16.667 1/s";

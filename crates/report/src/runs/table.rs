@@ -117,7 +117,7 @@ pub fn path(figures: &Figures) -> Table {
 
 /// Creates tables with a row per figure and a column per run: path, circular tests, and axes. From the second run on, a
 /// cell has the difference from the first run.
-pub fn comparison<P>(runs: &[SimulatedRun<P>]) -> [Table; 3] {
+pub fn comparison(runs: &[SimulatedRun]) -> [Table; 3] {
     // The tables of all runs have equal rows.
     let ends = runs.iter().any(|run| figure::overshoots(&run.outcome.figures));
     let axes: Vec<_> = runs.iter().map(|run| figure::of_axes(&run.outcome.figures)).collect();
@@ -130,7 +130,7 @@ pub fn comparison<P>(runs: &[SimulatedRun<P>]) -> [Table; 3] {
     ]
 }
 
-fn columns_of<P>(caption: &str, runs: &[SimulatedRun<P>], figures: &[Vec<Figure>]) -> Table {
+fn columns_of(caption: &str, runs: &[SimulatedRun], figures: &[Vec<Figure>]) -> Table {
     let mut table = table(caption, &[("figure", ""), ("unit", "")]);
     match runs {
         [_] => table.columns.push(TableColumn::new("value", "")),
@@ -156,7 +156,7 @@ fn columns_of<P>(caption: &str, runs: &[SimulatedRun<P>], figures: &[Vec<Figure>
 }
 
 /// Returns the explanation of the differences in [`comparison`].
-pub fn comparison_note<P>(runs: &[SimulatedRun<P>]) -> Option<String> {
+pub fn comparison_note(runs: &[SimulatedRun]) -> Option<String> {
     let first = runs.first().filter(|_| runs.len() > 1)?;
     Some(format!(
         "in parentheses: difference from {} in percent, of signed figures in their unit",
@@ -165,7 +165,7 @@ pub fn comparison_note<P>(runs: &[SimulatedRun<P>]) -> Option<String> {
 }
 
 /// Returns the definition of the reversal spikes, for runs with circles.
-pub fn spike_note<P>(runs: &[SimulatedRun<P>]) -> Option<String> {
+pub fn spike_note(runs: &[SimulatedRun]) -> Option<String> {
     let has_circle = runs.iter().any(|run| !run.outcome.figures.circles.is_empty());
     has_circle.then(|| {
         "reversal spike: the radial deviation within 20° of a reversal that differs most from the mean, minus the mean"

@@ -6,7 +6,7 @@ use super::figure::{self, Figure, percent};
 use super::{SimulatedRun, table};
 
 /// Returns the verdict of a single run, or a line for each further run that compares it with the first one.
-pub fn lines<P>(runs: &[SimulatedRun<P>]) -> Vec<String> {
+pub fn lines(runs: &[SimulatedRun]) -> Vec<String> {
     match runs {
         [] => Vec::new(),
         [run] => vec![single(run)],
@@ -14,7 +14,7 @@ pub fn lines<P>(runs: &[SimulatedRun<P>]) -> Vec<String> {
     }
 }
 
-fn single<P>(run: &SimulatedRun<P>) -> String {
+fn single(run: &SimulatedRun) -> String {
     let figures = &run.outcome.figures;
     let main = main_figure(figures);
     let contour = figure::of_path(figures, false);
@@ -28,7 +28,7 @@ fn single<P>(run: &SimulatedRun<P>) -> String {
     text + &warnings(run)
 }
 
-fn compared<P>(first: &SimulatedRun<P>, run: &SimulatedRun<P>) -> String {
+fn compared(first: &SimulatedRun, run: &SimulatedRun) -> String {
     let [from, to] = [main_figure(&first.outcome.figures), main_figure(&run.outcome.figures)];
     let change = percent(&from, &to).map(|change| format!(", {change}")).unwrap_or_default();
     let warnings = warnings(run);
@@ -62,7 +62,7 @@ fn worst_axis(figures: &Figures) -> Option<Figure> {
 }
 
 /// Returns warnings on loops and input, and the limits that axes reached, beginning with a semicolon; empty if there are none.
-fn warnings<P>(run: &SimulatedRun<P>) -> String {
+fn warnings(run: &SimulatedRun) -> String {
     let mut text = String::new();
     for warning in run.axis_warnings().iter().chain(&run.input_warnings) {
         text.push_str(&format!("; {warning}"));

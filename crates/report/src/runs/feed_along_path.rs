@@ -1,7 +1,7 @@
 //! Feed along the path of a part program: programmed and reached feed, and contour error.
 
+use crate::{AxisRange, Chart, ChartAxis, ChartSeries, DisplayUnit, Panel, SeriesStyle};
 use virtual_axes_nc::offline::CycleError;
-use virtual_axes_report::{AxisRange, Chart, ChartAxis, ChartSeries, DisplayUnit, Panel, SeriesStyle};
 
 /// Largest number of intervals that are kept; twice as many would not be visible in a plot.
 const MOST: usize = 4096;

@@ -1,27 +1,21 @@
-//! Times, worst lines and feed of a part program, as text and as a section of a page.
+//! Times, worst lines and feed of a part program: texts, and a section of a page.
 
-use virtual_axes_core::text::escaped;
 use virtual_axes_core::units::MILLIDEGREE;
 use virtual_axes_nc::offline::{ProgramFigures, WorstLine};
-use virtual_axes_report::{Section, Table, TableColumn};
 
-use crate::feed_along_path::FeedAlongPath;
-use crate::text_table;
+use super::FeedAlongPath;
+use crate::{Section, Table, TableColumn};
 
 /// Figures of a part program, and the feed along its path.
 #[derive(Debug, Clone)]
 pub struct ProgramReport {
+    /// Times and worst lines.
     pub figures: ProgramFigures,
+    /// Programmed and reached feed over the path position.
     pub feed: FeedAlongPath,
 }
 
 impl ProgramReport {
-    /// Returns the times and a table of the worst lines.
-    pub fn text(&self) -> String {
-        let table = self.worst_table(escaped);
-        text_table::wrapped_line(&self.times()) + &text_table::aligned(&table, &[1, 2])
-    }
-
     /// Returns a section of a page: times, worst lines and feed along the path.
     pub fn section(&self, heading: &str) -> Section {
         let mut table = self.worst_table(str::to_owned);
@@ -34,7 +28,8 @@ impl ProgramReport {
         }
     }
 
-    fn times(&self) -> String {
+    /// Returns cycle time and programmed time as one line.
+    pub fn times(&self) -> String {
         format!(
             "cycle time {:.2} s; motions at programmed feed alone {:.2} s",
             self.figures.cycle_time, self.figures.programmed_time
@@ -42,7 +37,7 @@ impl ProgramReport {
     }
 
     /// Returns a table of the worst lines; `escape` is applied to the texts of lines.
-    fn worst_table(&self, escape: impl Fn(&str) -> String) -> Table {
+    pub fn worst_table(&self, escape: impl Fn(&str) -> String) -> Table {
         let column =
             |name: &str, unit: &str| TableColumn { name: name.to_owned(), unit: unit.to_owned(), run: None };
         let row = |worst: &WorstLine| {
