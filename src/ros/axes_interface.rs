@@ -104,7 +104,7 @@ pub struct Accepted {
     pub is_late: bool,
 }
 
-/// SimulationReport of the simulation.
+/// Report of the simulation.
 #[derive(Debug)]
 pub enum SimulationReport {
     /// Acceptance or rejection of a trajectory, with its time, ns.

@@ -1,4 +1,4 @@
-//! DataWriters of a topic: the current one, the next and previous ones during a rotation ([`super::writer_rotation`])
+//! Writers of a topic: the current one, the next and previous ones during a rotation ([`super::writer_rotation`])
 //! or a renewal of the participant ([`super::renewal`]), and the messages kept for late joiners.
 
 use std::collections::VecDeque;
@@ -18,7 +18,7 @@ use super::rtps::Guid;
 use super::stalled_readers::StalledReaders;
 use super::writer_rotation::WriterRotation;
 
-/// DataWriter of a topic, with the handling of its stalled readers.
+/// Writer of a topic, with the handling of its stalled readers.
 pub(super) struct Writer<M: Serialize> {
     network: ros2_client::Publisher<M>,
     /// Sample count, and GAP for readers that do not acknowledge.

@@ -2,7 +2,7 @@
 
 use virtual_axes_core::machine::AxisSample;
 
-/// SignalQuantity of a signal, which has a unit by type of axis or motor.
+/// Quantity of a signal, which has a unit by type of axis or motor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum SignalQuantity {
     Position,

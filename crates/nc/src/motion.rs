@@ -121,9 +121,9 @@ pub enum Feed {
 /// Path control mode: behavior of the feed and of the path at the end of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PathControl {
-    /// Stop at the end of each motion (G61.1).
+    /// Stop at the end of each motion (G61.1). Splines deviate by up to 0.5 µm.
     ExactStop,
-    /// Exact path (G61): no deviation; a stop where the tangent is discontinuous.
+    /// Exact path (G61): a stop where tangent or curvature are discontinuous. Splines deviate by up to 0.5 µm.
     ExactPath,
     /// Blending within a tolerance (G64).
     Blend(Blend),
@@ -136,7 +136,7 @@ pub struct Blend {
     pub tolerance: Option<f64>,
     /// Maximum deviation of A, B and C, rad: as many degrees as `tolerance` has millimeters.
     pub rotary_tolerance: Option<f64>,
-    /// Maximum deviation of lines that are merged into one curve, m; `None` without Q: as `tolerance`.
+    /// Word Q, m, which has no effect: lines are joined within `tolerance`.
     pub merge_tolerance: Option<f64>,
 }
 

@@ -22,7 +22,7 @@ pub struct Table {
 pub struct TableColumn {
     /// Quantity.
     pub name: String,
-    /// DisplayUnit of its numbers; can be empty.
+    /// Unit of its numbers; can be empty.
     pub unit: String,
     /// Index of the run whose figures the column contains; its heading has a sample of the run's line.
     pub run: Option<usize>,

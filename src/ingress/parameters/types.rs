@@ -88,7 +88,7 @@ pub enum ParameterRange {
     },
 }
 
-/// ParameterDescriptor of a parameter.
+/// Descriptor of a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterDescriptor {
     /// Type of its value.

@@ -14,7 +14,7 @@ use crate::ros::health::{AxisHealth, ClockHealth, Health};
 use crate::ros::program::ProgramMonitor;
 use crate::ros::stream::StreamIntake;
 use virtual_axes_core::simulation::Simulation;
-use virtual_axes_core::trajectory::{MotionId, Rejection, RejectionCode};
+use virtual_axes_core::trajectory::{MotionId, Rejection, RejectionCode, Trajectory};
 use virtual_axes_core::units::Nanoseconds;
 
 /// Largest number of unread reports on stream ends. Later ends are merged into the next report.
@@ -43,8 +43,8 @@ pub(super) struct Axes {
     frames: ArcPool<SampleFrame>,
     /// Active stops, whose ends are not reported.
     stops: Vec<MotionId>,
-    /// Figures of the active part program.
-    program: Option<ProgramMonitor>,
+    /// Figures of the part programs whose ends are not reported, the active one last.
+    programs: Vec<ProgramMonitor>,
     activity: Activity,
     /// Counter of the unread reports on stream ends.
     stream_ends: Arc<()>,
@@ -59,7 +59,7 @@ impl Axes {
         health.send_modify(|h| h.axes = vec![AxisHealth::default(); simulation.samples().len()]);
         let (stream, frames) = (StreamIntake::default(), ArcPool::default());
         let (motions, stops, stream_ends) = (Vec::new(), Vec::new(), Arc::new(()));
-        let program = None;
+        let programs = Vec::new();
         let activity = Activity::Active;
         Axes {
             simulation,
@@ -70,7 +70,7 @@ impl Axes {
             motions,
             frames,
             stops,
-            program,
+            programs,
             activity,
             stream_ends,
         }
@@ -87,7 +87,7 @@ impl Axes {
 
     /// Computes the next position cycle.
     pub(super) fn step(&mut self) -> Arc<SampleFrame> {
-        let Axes { simulation, stream, resets, motions, frames, program, activity, .. } = self;
+        let Axes { simulation, stream, resets, motions, frames, programs, activity, .. } = self;
         let is_published = !matches!(activity, Activity::Inactive);
         let instant = simulation.next_instant();
         simulation.step();
@@ -97,7 +97,7 @@ impl Axes {
             let error = simulation.contour_error(track.motion);
             track.update(time, simulation.path_place(), simulation.samples(), error)
         };
-        let place = program.as_mut().and_then(track);
+        let place = programs.last_mut().and_then(track);
         frames.acquire(|frame| {
             frame.is_published = is_published;
             frame.instant = instant;
@@ -135,7 +135,7 @@ impl Axes {
         if Arc::strong_count(&self.stream_ends) <= MAX_STREAM_ENDS
             && let Some((end, joints)) = self.simulation.take_stream_end()
         {
-            let now = self.simulation.time_of(self.simulation.next_instant() - 1);
+            let now = self.now();
             let unread = Arc::clone(&self.stream_ends);
             let _ = self.reports.send(SimulationReport::StreamEnded(now, end, joints, unread));
         }
@@ -147,8 +147,8 @@ impl Axes {
             if self.stops.len() < count {
                 continue;
             }
-            let program = self.program.take_if(|program| program.motion == end.id);
-            let report = match program {
+            let program = self.programs.iter().position(|program| program.motion == end.id);
+            let report = match program.map(|index| self.programs.remove(index)) {
                 Some(program) => SimulationReport::ProgramEnded(end, program.finish(period)),
                 None => SimulationReport::MotionEnded(end),
             };
@@ -193,15 +193,13 @@ impl Axes {
 
     /// Applies a command; it takes effect in the next step.
     pub(super) fn apply(&mut self, command: Command) {
-        let Axes { simulation, reports, stream, resets, motions, stops, program, activity, .. } = self;
-        let is_active = matches!(activity, Activity::Active);
-        // Between two instants, the current time is the time of the first.
-        let now = simulation.time_of(simulation.next_instant() - 1);
+        let is_active = matches!(self.activity, Activity::Active);
+        let simulation = &mut self.simulation;
         match command {
             Command::Submit { id, .. } | Command::BeginMotion { id, .. } if !is_active => {
                 let text = "the node is not active; activate it with ~/change_state";
                 let rejection = Rejection::new(RejectionCode::NotActive, text.to_owned());
-                let _ = reports.send(SimulationReport::Decision(id, now, Err(rejection)));
+                self.send_decision(id, Err(rejection));
             }
             // A stream has no response.
             Command::Stream(_) if !is_active => {}
@@ -210,24 +208,13 @@ impl Axes {
                     Some(tolerances) => simulation.submit_with_tolerances(id, trajectory, *tolerances),
                     None => simulation.submit(id, trajectory),
                 };
-                let decision = admission.map(|admission| Accepted {
+                let accepted = admission.map(|admission| Accepted {
                     start: simulation.time_of(admission.start_k),
                     is_late: admission.is_late,
                 });
-                if let Ok(accepted) = &decision {
-                    motions.push((id, accepted.start));
-                }
-                let _ = reports.send(SimulationReport::Decision(id, now, decision));
+                self.send_decision(id, accepted);
             }
-            Command::BeginMotion { id, linear, rest } => {
-                *program = Some(ProgramMonitor::new(id, linear));
-                let positions = simulation.begin_motion(id);
-                motions.push((id, now));
-                let accepted = Accepted { start: now, is_late: false };
-                let _ = reports.send(SimulationReport::Decision(id, now, Ok(accepted)));
-                // Its planning ends with the node.
-                let _ = rest.send(positions);
-            }
+            Command::BeginMotion { id, linear, rest } => self.begin_program(id, linear, rest),
             Command::ExtendMotion { id, chunk } => {
                 if let Err(rejection) = simulation.extend_motion(id, chunk) {
                     warn!("part program canceled, its planned motion is not continuous: {rejection}");
@@ -237,10 +224,7 @@ impl Axes {
             Command::FinishMotion(id) => {
                 simulation.finish_motion(id);
             }
-            Command::Stop(id, trajectory) => match simulation.submit(id, trajectory) {
-                Ok(_) => stops.push(id),
-                Err(rejection) => warn!("controlled stop rejected: {rejection}"),
-            },
+            Command::Stop(id, trajectory) => self.stop(id, trajectory),
             Command::Cancel(id, done) => {
                 let _ = done.send(simulation.cancel(id));
             }
@@ -255,7 +239,7 @@ impl Axes {
                     simulation.set_load(axis, load, hold);
                 }
             }
-            Command::Stream(setpoints) => stream.submit(simulation, &setpoints),
+            Command::Stream(setpoints) => self.stream.submit(simulation, &setpoints),
             Command::QueryState(time, done) => {
                 let (states, is_commanded) = simulation.planned_states(time);
                 let has_trajectory = simulation.has_trajectory();
@@ -269,24 +253,51 @@ impl Axes {
             Command::Reset(done) => {
                 info!("reset: at rest at home");
                 simulation.reset();
-                *resets += 1;
+                self.resets += 1;
                 let _ = done.send(());
             }
-            Command::Activate => *activity = Activity::Active,
+            Command::Activate => self.activity = Activity::Active,
             Command::Deactivate { id, stop, done } => {
                 if let Some(stop) = stop.filter(|_| simulation.is_busy()) {
-                    match simulation.submit(id, stop) {
-                        Ok(_) => stops.push(id),
-                        Err(rejection) => warn!("controlled stop rejected: {rejection}"),
-                    }
+                    self.stop(id, stop);
                 }
-                *activity = Activity::Stopping(done);
-                if !simulation.is_busy() {
+                self.activity = Activity::Stopping(done);
+                if !self.simulation.is_busy() {
                     self.finish_deactivation();
                 }
             }
             // The caller ends the thread.
             Command::Shutdown => {}
         }
+    }
+
+    /// Begins the motion of a part program and sends the positions at which it begins.
+    fn begin_program(&mut self, id: MotionId, linear: Vec<usize>, rest: oneshot::Sender<Vec<f64>>) {
+        self.programs.push(ProgramMonitor::new(id, linear));
+        let positions = self.simulation.begin_motion(id);
+        self.send_decision(id, Ok(Accepted { start: self.now(), is_late: false }));
+        // Its planning ends with the node.
+        let _ = rest.send(positions);
+    }
+
+    /// Begins a controlled stop, whose end is not reported.
+    fn stop(&mut self, id: MotionId, trajectory: Arc<Trajectory>) {
+        match self.simulation.submit(id, trajectory) {
+            Ok(_) => self.stops.push(id),
+            Err(rejection) => warn!("controlled stop rejected: {rejection}"),
+        }
+    }
+
+    /// Reports the acceptance or rejection of a motion; an accepted one counts as active.
+    fn send_decision(&mut self, id: MotionId, decision: Result<Accepted, Rejection>) {
+        if let Ok(accepted) = &decision {
+            self.motions.push((id, accepted.start));
+        }
+        let _ = self.reports.send(SimulationReport::Decision(id, self.now(), decision));
+    }
+
+    /// Returns the current time, ns: between two instants, the time of the first.
+    fn now(&self) -> Nanoseconds {
+        self.simulation.time_of(self.simulation.next_instant() - 1)
     }
 }

@@ -4,7 +4,6 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
-use tokio::runtime::Handle;
 use tokio::sync::{mpsc, oneshot, watch};
 use tracing::warn;
 
@@ -127,8 +126,7 @@ impl GoalHandler for ProgramGoals {
         let _ = self.commands.send(Command::BeginMotion { id: motion, linear, rest: rest_out }).await;
         let (machine, commands) = (Arc::clone(&self.machine), self.commands.clone());
         let planning = Planning { motion, source, start_line, machine, state, commands, rest };
-        let runtime = Handle::current();
-        tokio::task::spawn_blocking(move || planning.run(&runtime));
+        tokio::spawn(planning.run());
         Ok(motion)
     }
 

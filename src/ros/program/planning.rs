@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
+use tokio::task::JoinError;
 
 use super::source::ProgramText;
 use crate::ros::axes_interface::Command;
@@ -90,21 +91,24 @@ pub(super) struct Planning {
 }
 
 impl Planning {
-    /// Plans the program until its end, its first error or the end of its motion. Blocks while enough is planned ahead.
-    pub(super) fn run(self, runtime: &Handle) {
+    /// Plans the program in a thread of its own until its end, its first error or the end of its motion.
+    pub(super) async fn run(self) {
         let (commands, motion, state) = (self.commands.clone(), self.motion, Arc::clone(&self.state));
-        let command = match self.plan(runtime) {
-            Ok(()) => Command::FinishMotion(motion),
-            Err(error) => {
+        let runtime = Handle::current();
+        let planned = tokio::task::spawn_blocking(move || self.plan(&runtime)).await;
+        let command = match error_of(planned) {
+            None => Command::FinishMotion(motion),
+            Some(error) => {
                 state.update(|outcome| outcome.error = Some(error));
                 // The end of the motion reports the error.
                 Command::Cancel(motion, oneshot::channel().0)
             }
         };
         // The channel is closed only at shutdown.
-        let _ = commands.blocking_send(command);
+        let _ = commands.send(command).await;
     }
 
+    /// Plans the program; blocks while enough is planned ahead.
     fn plan(self, runtime: &Handle) -> Result<(), String> {
         let Planning { motion, source, start_line, machine, state, commands, rest } = self;
         let ProgramText { name, reader } = source;
@@ -138,6 +142,14 @@ impl Planning {
     }
 }
 
+/// Returns the error of a program, also if its thread has panicked: then no goal would ever end.
+fn error_of(planned: Result<Result<(), String>, JoinError>) -> Option<String> {
+    match planned {
+        Ok(planned) => planned.err(),
+        Err(error) => Some(format!("internal error of the planner: {error}")),
+    }
+}
+
 /// Returns the length of a chunk, position cycles: the longest time in which an axis stops.
 fn chunk_cycles(machine: &MachineConfig) -> u32 {
     let stopping_time = |limits: JointLimits| {
@@ -147,4 +159,18 @@ fn chunk_cycles(machine: &MachineConfig) -> u32 {
     let times = machine.axes().iter().map(|axis| stopping_time(JointLimits::from_axis(axis)));
     let longest = times.fold(MIN_CHUNK, f64::max);
     (longest / seconds(machine.periods().position)).ceil().clamp(1.0, 1e6) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn every_end_of_the_thread_has_its_outcome() {
+        let failed = tokio::task::spawn_blocking(|| -> Result<(), String> { panic!("planner") });
+        assert!(error_of(failed.await).is_some_and(|error| error.contains("planner")));
+        let invalid = tokio::task::spawn_blocking(|| Err("part.nc:1: G41".to_owned()));
+        assert_eq!(error_of(invalid.await).as_deref(), Some("part.nc:1: G41"));
+        assert_eq!(error_of(tokio::task::spawn_blocking(|| Ok(())).await), None);
+    }
 }

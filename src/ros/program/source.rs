@@ -32,7 +32,8 @@ impl ProgramText {
     /// Opens the built-in part program `path`, or the file `path` if there is none, in at most 5 s.
     ///
     /// # Errors
-    /// Text that begins with the path, if it is neither a built-in part program nor not a regular file of at most 4 GiB that can be read.
+    /// Text that begins with the path, if it is neither a built-in part program nor a regular file of at most 4 GiB that can
+    /// be read.
     pub async fn open(path: String) -> Result<Self, String> {
         let name = escaped(&path).to_string();
         if let Some(program) = BuiltinProgram::find(&path) {

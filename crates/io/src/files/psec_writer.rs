@@ -14,7 +14,7 @@ use crate::messages::std_msgs::msg::Header;
 use crate::messages::{self, Schema};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
-/// McapTopic of the trajectory in a recording.
+/// Topic of the trajectory in a recording.
 const TOPIC: &str = "/psec";
 
 /// Writer of position setpoints. Dropping it before [`finish`](Self::finish) leaves no file.

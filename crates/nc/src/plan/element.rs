@@ -1,5 +1,6 @@
 //! Exact curves of single motions: lines, arcs and helices in the coordinates of the machine's joints.
 
+use super::nurbs::SplineTable;
 use super::vector::{Jet, JointVector, MAX_JOINTS, difference, mix, norm};
 
 /// Length that counts for one radian of a rotary axis in the path parameter, m.
@@ -58,6 +59,7 @@ impl JointKinds {
 pub(super) enum Shape {
     Line,
     Arc(Arc),
+    Spline(SplineTable),
 }
 
 /// Circle with a linearly changing radius, which corrects a rounded center.
@@ -94,12 +96,18 @@ impl Element {
             step[arc.plane[0]] = 0.5 * (r0 + r1) * arc.sweep;
             step[arc.plane[1]] = r1 - r0;
         }
-        kinds.length(&step)
+        match shape {
+            Shape::Spline(table) => table.length(),
+            _ => kinds.length(&step),
+        }
     }
 
     /// Returns the coordinates at path parameter `u`, exact at both ends.
     pub fn point(&self, u: f64) -> JointVector {
         let t = u / self.length;
+        if let Shape::Spline(table) = &self.shape {
+            return table.point(&self.from, &self.to, u);
+        }
         let mut point = mix(&self.from, &self.to, t);
         if let Shape::Arc(arc) = &self.shape
             && t > 0.0
@@ -128,6 +136,9 @@ impl Element {
             (jet[2][x], jet[2][y]) = (w * (-2.0 * dr * s - r * w * c), w * (2.0 * dr * c - r * w * s));
             let w2 = w * w;
             (jet[3][x], jet[3][y]) = (w2 * (-3.0 * dr * c + r * w * s), w2 * (-3.0 * dr * s - r * w * c));
+        }
+        if let Shape::Spline(table) = &self.shape {
+            jet[1] = table.slope(&self.from, &self.to, u);
         }
         jet
     }

@@ -66,6 +66,16 @@ pub enum FeedPlanError {
         /// Feed found, m/s, rad/s or s.
         value: f64,
     },
+    /// Blending tolerance that is too small.
+    #[error("line {line}: blending tolerance {} µm must be at least {} µm", Rounded(*.value * 1e6), Rounded(*.least * 1e6))]
+    ToleranceTooSmall {
+        /// Source line.
+        line: usize,
+        /// Tolerance found, m.
+        value: f64,
+        /// Smallest tolerance, m.
+        least: f64,
+    },
     /// Motion of an axis that the machine does not have.
     #[error("line {line}: axis {axis} moves, but the machine has no such axis")]
     MissingAxis {
@@ -81,6 +91,16 @@ pub enum FeedPlanError {
         line: usize,
         /// Largest difference of a coordinate, m or rad.
         gap: f64,
+    },
+    /// Spline that needs too many points within its tolerance.
+    #[error(
+        "line {line}: the spline needs more than {allowed} points; it is too long or its control points are too far apart"
+    )]
+    SplineTooLong {
+        /// Source line.
+        line: usize,
+        /// Largest number of points.
+        allowed: usize,
     },
     /// Tool center point control without X, Y and Z.
     #[error("line {line}: tool center point control needs a machine with the axes X, Y and Z")]

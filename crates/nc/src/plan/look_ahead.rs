@@ -35,7 +35,7 @@ const ACCEPTED: f64 = 0.9985;
 pub(super) struct Entry {
     station: Option<Station>,
     pub piece: Option<Arc<Piece>>,
-    /// WindowStart of the interval from the start of the piece.
+    /// Start of the interval from the start of the piece.
     pub from: f64,
     pub segment: Option<PathSegment>,
     /// True if the motion stops at the end of the interval.

@@ -14,8 +14,8 @@ use super::piece::{CapSpan, FeedChange, Piece, PieceCurve};
 use super::source::BlendTolerance;
 use super::vector::{Jet, JointVector, norm};
 
-/// Deviation on arcs, m: the tolerance is for corners.
-const ARC_DEVIATION: f64 = 0.5e-6;
+/// Deviation on arcs and splines, m: the tolerance is for corners.
+pub(super) const ARC_DEVIATION: f64 = 0.5e-6;
 /// Fraction of the tolerance used for knots of equal distance.
 const USED: f64 = 0.9;
 /// Number of equal parts of an interval at whose ends the deviation is computed.

@@ -6,17 +6,18 @@ use virtual_axes_core::trajectory::JointLimits;
 
 use super::element::{Arc, Element, FeedCap, FeedJoints, JointKinds, Shape};
 use super::error::{FeedPlanError, StepError};
+use super::nurbs::SplineTable;
+use super::run::ARC_DEVIATION;
 use super::vector::{JointVector, MAX_JOINTS};
 use crate::motion::{
-    AXIS_COUNT, AXIS_LETTERS, Coordinates, Feed, MotionKind, Nurbs, PathControl, PlanarArc, ProgramEvent,
-    ProgramMotion, ProgramStep,
+    AXIS_COUNT, AXIS_LETTERS, Blend, Coordinates, Feed, MotionKind, Nurbs, PathControl, PlanarArc,
+    ProgramEvent, ProgramMotion, ProgramStep,
 };
 
 /// Largest gap between two motions, m or rad.
 const GAP_TOLERANCE: f64 = 1e-9;
-/// Number of lines per knot interval of a NURBS curve.
-const LINES_PER_KNOT: usize = 64;
-
+/// Smallest blending tolerance, m.
+const MIN_TOLERANCE: f64 = 1e-8;
 /// Tolerances of blending at the end of an element: linear axes (m) and rotary axes (rad).
 pub(super) type BlendTolerance = [f64; 2];
 
@@ -30,7 +31,7 @@ pub(super) enum Part {
     Stop(f64),
 }
 
-/// ProgramAxes of the machine and their programmed letters.
+/// Axes of the machine and their programmed letters.
 #[derive(Debug, Clone)]
 pub(super) struct ProgramAxes {
     /// Joint of each programmed axis.
@@ -130,10 +131,10 @@ where
         (self.end, self.tcp_length) = (Some(motion.end), motion.tcp_length);
         let (from, to) = (self.axes.vector(&motion.start), self.axes.vector(&motion.end));
         match &motion.kind {
-            MotionKind::Rapid | MotionKind::Line => self.push(motion, Shape::Line, from, to, 1.0),
+            MotionKind::Rapid | MotionKind::Line => self.push(motion, Shape::Line, from, to),
             MotionKind::Arc(arc) => {
                 let shape = self.arc(arc, &from, &to, motion.line)?;
-                self.push(motion, shape, from, to, 1.0);
+                self.push(motion, shape, from, to);
             }
             MotionKind::Nurbs(nurbs) => self.push_nurbs(motion, nurbs, from, to)?,
         }
@@ -151,6 +152,11 @@ where
             && !(value > 0.0 && value.is_finite())
         {
             return Err(FeedPlanError::InvalidFeed { line, value });
+        }
+        if let PathControl::Blend(Blend { tolerance: Some(value), .. }) = motion.path_control
+            && (value.is_nan() || value < MIN_TOLERANCE)
+        {
+            return Err(FeedPlanError::ToleranceTooSmall { line, value, least: MIN_TOLERANCE });
         }
         for (axis, letter) in AXIS_LETTERS.into_iter().enumerate() {
             if self.axes.joint_of[axis].is_none() && motion.start[axis] != motion.end[axis] {
@@ -193,15 +199,15 @@ where
         Ok(Shape::Arc(Arc { plane: [x, y], center: arc.center, radii, phase, sweep: arc.sweep }))
     }
 
-    /// Appends a curve that is the fraction `share` of the motion.
-    fn push(&mut self, motion: &ProgramMotion, shape: Shape, from: JointVector, to: JointVector, share: f64) {
+    /// Appends a curve.
+    fn push(&mut self, motion: &ProgramMotion, shape: Shape, from: JointVector, to: JointVector) {
         let length = Element::measure(&shape, &from, &to, &self.axes.kinds);
         if length <= 0.0 {
             return;
         }
         let xyz = self.axes.set([0, 1, 2]);
-        let has_arc = matches!(shape, Shape::Arc(_));
-        let moves_xyz = has_arc || xyz.norm(&std::array::from_fn(|i| to[i] - from[i])) > 0.0;
+        let is_curved = !matches!(shape, Shape::Line);
+        let moves_xyz = is_curved || xyz.norm(&std::array::from_fn(|i| to[i] - from[i])) > 0.0;
         let (cap, feed) = match motion.feed {
             Feed::Rapid => (FeedCap::Rapid, f64::INFINITY),
             Feed::Linear(value) => {
@@ -209,7 +215,7 @@ where
                 (FeedCap::Speed { value, joints }, value)
             }
             Feed::Rotary(value) => (FeedCap::Speed { value, joints: self.axes.set([3, 4, 5]) }, value),
-            Feed::Duration(time) => (FeedCap::Rate(length / (time * share)), length / (time * share)),
+            Feed::Duration(time) => (FeedCap::Rate(length / time), length / time),
         };
         let blend = match motion.path_control {
             PathControl::Blend(blend) => Some([
@@ -224,7 +230,8 @@ where
         self.pending.push_back(Part::Curve { element, blend, is_exact_path });
     }
 
-    /// Appends the lines of a NURBS curve, blended within the default tolerance inside the curve.
+    /// Appends a NURBS curve. Where the path control allows no deviation, it is followed within [`ARC_DEVIATION`] and ends
+    /// with a stop. A curve of order 2 is a sequence of lines.
     fn push_nurbs(
         &mut self,
         motion: &ProgramMotion,
@@ -236,34 +243,50 @@ where
         let (Some(x), Some(y)) = (self.axes.joint_of[first], self.axes.joint_of[second]) else {
             return Err(FeedPlanError::MissingAxis { line: motion.line, axis: AXIS_LETTERS[first] });
         };
-        let knots = nurbs.control.len().saturating_sub(nurbs.order.max(2)) + 1;
-        let count = knots * LINES_PER_KNOT;
-        let mut before = from;
-        for i in 1..=count {
-            let t = i as f64 / count as f64;
-            let mut point = super::vector::mix(&from, &to, t);
-            if i < count {
-                let [px, py] = super::nurbs::point(nurbs, t);
-                if !(px.is_finite() && py.is_finite()) {
-                    return Err(FeedPlanError::NotFinite {
-                        line: motion.line,
-                        what: "NURBS point",
-                        value: px + py,
-                    });
-                }
-                (point[x], point[y]) = (px, py);
-            }
-            self.push(motion, Shape::Line, before, point, 1.0 / count as f64);
-            before = point;
+        if nurbs.order <= 2 {
+            self.push_polyline(motion, nurbs, [x, y], [from, to]);
+            return Ok(());
         }
-        let inside = Some(self.default_tolerance);
-        let last = self.pending.len().saturating_sub(1);
-        for part in self.pending.iter_mut().take(last) {
-            if let Part::Curve { blend, is_exact_path, .. } = part {
-                *blend = blend.or(inside);
-                *is_exact_path = false;
-            }
+        let tolerance = match motion.path_control {
+            PathControl::Blend(blend) => blend.tolerance.unwrap_or(self.default_tolerance[0]),
+            _ => ARC_DEVIATION,
+        };
+        let kinds = &self.axes.kinds;
+        let (table, error) = SplineTable::new(nurbs, [x, y], [&from, &to], kinds, tolerance, motion.line)?;
+        let blend = match motion.path_control {
+            PathControl::Blend(blend) => blend,
+            _ => Blend { tolerance: None, rotary_tolerance: None, merge_tolerance: None },
+        };
+        let blend = PathControl::Blend(Blend { tolerance: Some(tolerance - error), ..blend });
+        self.push(&ProgramMotion { path_control: blend, ..motion.clone() }, Shape::Spline(table), from, to);
+        if !matches!(motion.path_control, PathControl::Blend(_)) {
+            self.pending.push_back(Part::Stop(0.0));
         }
         Ok(())
+    }
+
+    /// Appends the lines between the control points of a spline of order 2.
+    fn push_polyline(
+        &mut self,
+        motion: &ProgramMotion,
+        nurbs: &Nurbs,
+        [x, y]: [usize; 2],
+        [from, to]: [JointVector; 2],
+    ) {
+        let last = nurbs.control.len().saturating_sub(1);
+        let feed = match motion.feed {
+            Feed::Duration(time) => Feed::Duration(time / last as f64),
+            feed => feed,
+        };
+        let motion = ProgramMotion { feed, ..motion.clone() };
+        let mut before = from;
+        for (i, (position, _)) in nurbs.control.iter().enumerate().skip(1) {
+            let mut point = super::vector::mix(&from, &to, i as f64 / last as f64);
+            if i < last {
+                [point[x], point[y]] = *position;
+            }
+            self.push(&motion, Shape::Line, before, point);
+            before = point;
+        }
     }
 }

@@ -20,6 +20,8 @@ const GRADED_PARTS: usize = 4;
 const FEED_CHANGE: f64 = 0.9;
 /// Smallest interval at a change of the feed, m.
 const MIN_INTERVAL: f64 = 1e-8;
+/// Smallest interval at a stop, m; less in shorter pieces.
+const LEAST_REST: f64 = 1e-9;
 /// Largest turn of an arc or of a rotary axis per interval of an exact curve, rad.
 const TURN: f64 = 0.1;
 /// Largest number of intervals of one piece.
@@ -32,7 +34,7 @@ pub(super) const SHARE: f64 = 0.995;
 pub(super) struct Station {
     pub interval: Interval,
     pub piece: Arc<Piece>,
-    /// WindowStart of the interval from the start of the piece.
+    /// Start of the interval from the start of the piece.
     pub from: f64,
 }
 
@@ -103,7 +105,8 @@ impl MachineModel {
         let (node, cap) = self.node(piece, 0.0);
         let [acceleration, jerk] = self.tangential(&node);
         let phase = (acceleration / jerk).min((cap / jerk).sqrt());
-        let rest = (jerk * (REST_FRACTION * phase).powi(3) / 6.0).clamp(1e-9, 0.05 * piece.length);
+        let most = 0.05 * piece.length;
+        let rest = (jerk * (REST_FRACTION * phase).powi(3) / 6.0).clamp(LEAST_REST.min(most), most);
         let largest = match &piece.curve {
             PieceCurve::Cubic(_) => {
                 let parts = if piece.is_graded { GRADED_PARTS } else { PARTS };

@@ -9,5 +9,7 @@ mod optimum;
 mod profile;
 mod programs;
 mod random;
+mod short_motions;
 mod speed_search;
+mod splines;
 mod timeline;

@@ -1,7 +1,7 @@
 //! Motions of test programs.
 
 use virtual_axes_nc::motion::{
-    Blend, Coordinates, Feed, MotionKind, PathControl, PlanarArc, Plane, ProgramEvent, ProgramMotion,
+    Blend, Coordinates, Feed, MotionKind, Nurbs, PathControl, PlanarArc, Plane, ProgramEvent, ProgramMotion,
     ProgramStep,
 };
 
@@ -72,6 +72,20 @@ impl Program {
         end[2] += dz;
         let arc = PlanarArc { plane: Plane::Xy, center, sweep };
         self.push(MotionKind::Arc(arc), end, Feed::Linear(self.feed));
+        self
+    }
+
+    /// Appends a NURBS curve in the XY plane with control points (m) and weights after the present point.
+    pub fn nurbs(&mut self, order: usize, control: &[([f64; 2], f64)]) -> &mut Self {
+        let start = ([self.at[0], self.at[1]], 1.0);
+        let control: Vec<_> = std::iter::once(start).chain(control.iter().copied()).collect();
+        let mut end = self.at;
+        end[..2].copy_from_slice(&control[control.len() - 1].0);
+        self.push(
+            MotionKind::Nurbs(Nurbs { plane: Plane::Xy, order, control }),
+            end,
+            Feed::Linear(self.feed),
+        );
         self
     }
 

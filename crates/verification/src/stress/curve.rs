@@ -4,7 +4,7 @@ use super::random::RandomSource;
 use super::shape::{MotionLimits, extent};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
-/// CurvePoint of one axis: displacement, velocity, acceleration.
+/// Point of one axis: displacement, velocity, acceleration.
 pub type CurvePoint = [f64; 3];
 
 /// Largest velocity of a point, relative to the mean velocity of a segment.

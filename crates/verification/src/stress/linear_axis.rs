@@ -12,7 +12,7 @@ use virtual_axes_core::units::{Nanoseconds, seconds};
 
 /// Number of states: i, ω, θ and the integrals of the velocity and the current controller.
 pub const STATES: usize = 5;
-/// LoopState of the three loops.
+/// State of the three loops.
 pub type LoopState = [f64; STATES];
 
 /// Linear model of one axis, sampled at three rates.

@@ -34,7 +34,7 @@ pub struct ImpulseResponses {
     instants: usize,
 }
 
-/// ResponseInputs of one axis for the superposition of its impulse responses.
+/// Inputs of one axis for the superposition of its impulse responses.
 #[derive(Debug, Clone, Copy)]
 pub struct ResponseInputs<'a> {
     /// Δ by position cycle, m or rad; the first is relative to rest.

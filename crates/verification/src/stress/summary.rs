@@ -1,4 +1,4 @@
-//! StressSummary of the results of many trajectories.
+//! Summary of the results of many trajectories.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ const MIN_BOUND: f64 = 1e-9;
 /// Largest number of recorded violations.
 const MAX_VIOLATIONS: usize = 20;
 
-/// StressSummary of trajectories, accumulated in the order of their numbers.
+/// Summary of trajectories, accumulated in the order of their numbers.
 #[derive(Debug, Clone)]
 pub struct StressSummary {
     /// Number of trajectories.

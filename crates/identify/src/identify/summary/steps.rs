@@ -313,7 +313,7 @@ pub struct DelaySummary {
     pub feedforward: FeedforwardMode,
     /// Identified delay, ms.
     pub value_ms: f64,
-    /// ConfidenceInterval of equivalent delays, ms: above the first and up to the second value.
+    /// Confidence interval of equivalent delays, ms: above the first and up to the second value.
     pub interval_ms: [f64; 2],
     /// True if the value of the machine file was kept.
     #[serde(rename = "left")]
