@@ -25,6 +25,9 @@ BURST_S = 1.0
 REANNOUNCED_S = 3.5
 """Fast DDS rediscovers publishers and clients for a restarted node after 3 s in most cases."""
 RECOVERY_S = 30.0
+RESTARTS = 4
+AT_ONCE_S = 1.2
+"""Longest time for which a message or call is at once; one of `RESTARTS` may take longer on a busy machine."""
 Answer = TypeVar("Answer")
 
 
@@ -128,3 +131,33 @@ def test_existing_participants_work_with_a_node_that_was_killed_and_started_agai
         recovers(drive.reset)
         # Action client.
         assert recovers(lambda: follow.send(goal(line(["x"], [0.001], 0.2)))).status() == GoalStatus.STATUS_SUCCEEDED
+
+
+def test_existing_publishers_and_clients_reach_a_restarted_node_at_once():
+    """A node that was ended and started again takes the first message and call of participants older than itself.
+
+    Without a request of the node, they would wait for the next heartbeat of their publishers, 3 s.
+    """
+    gain = "x.velocity_loop.gain"
+    seconds: dict[str, list[float]] = {"psec": [], "service": []}
+    with Node() as process, AxesClient(process=process) as drive:
+        drive.accept(joint_trajectory(["x"], [1.0], [[0.001]]))
+        drive.get_parameters([gain])
+        for _ in range(RESTARTS):
+            drive.process = None
+            process.stop(signal.SIGINT)
+            last = drive.now()
+            process.start()
+            drive.process = process
+            drive.wait_for(lambda last=last: drive.now() > last, RECOVERY_S, "samples of the new node")
+            acts: dict[str, Callable[[], object]] = {
+                "psec": lambda: drive.accept(joint_trajectory(["x"], [1.0], [[0.001]]), timeout=RECOVERY_S),
+                "service": lambda: drive.get_parameters([gain]),
+            }
+            for name in acts:
+                begin = time.monotonic()
+                acts[name]()
+                seconds[name].append(time.monotonic() - begin)
+    for name, found in seconds.items():
+        at_once = sum(second < AT_ONCE_S for second in found)
+        assert at_once >= RESTARTS - 1, f"{name}: {found} s"

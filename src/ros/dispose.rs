@@ -138,6 +138,12 @@ pub(super) fn discovery_port(domain_id: u16, participant_id: u16) -> Option<u16>
     u16::try_from(first + PORTS_PER_PARTICIPANT * u32::from(participant_id)).ok()
 }
 
+/// Returns the port at which a participant of this host receives unicast samples, if it exists: the one after that of
+/// discovery messages.
+pub(super) fn user_port(domain_id: u16, participant_id: u16) -> Option<u16> {
+    discovery_port(domain_id, participant_id)?.checked_add(1)
+}
+
 /// Returns the datagram that disposes of the participant or endpoint `guid`, as sample `sequence_number` of the
 /// built-in `writer`.
 fn dispose_datagram(guid: &Guid, writer: EntityId, sequence_number: i64) -> Vec<u8> {

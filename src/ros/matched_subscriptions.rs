@@ -12,7 +12,7 @@ use tokio::sync::watch;
 use tracing::debug;
 
 use super::announcement_eviction::AnnouncementEviction;
-use super::first_sample_nack::FirstSampleNack;
+use super::heartbeat_request::HeartbeatRequest;
 use super::own_participants::OwnParticipants;
 use super::remote_endpoints::{EndpointCounter, RemoteEndpoints};
 use super::remote_participants::RemoteParticipants;
@@ -79,7 +79,7 @@ impl MatchedSubscriptionTracker {
     }
 }
 
-/// Handling of the status events of a participant: updates the matched subscriptions, requests the first sample of
+/// Handling of the status events of a participant: updates the matched subscriptions, requests a HEARTBEAT of
 /// matched writers, counts discovered endpoints, and records the participants.
 ///
 /// A participant delivers each event to one listener only, so one task handles all of them.
@@ -94,7 +94,7 @@ pub(super) struct DiscoveryEvents {
     pub counter: Arc<EndpointCounter>,
     /// Other participants.
     pub participants: RemoteParticipants,
-    /// True while the node uses this participant. Before and after, no flag is changed and no sample requested.
+    /// True while the node uses this participant. Before and after, no flag is changed and no HEARTBEAT requested.
     pub is_current: Arc<AtomicBool>,
 }
 
@@ -103,7 +103,7 @@ impl DiscoveryEvents {
     pub(super) async fn run(self) {
         let DiscoveryEvents { participant, tracker, own, counter, participants, is_current } = self;
         let is_current = || is_current.load(Ordering::Relaxed);
-        let first_sample = FirstSampleNack::open();
+        let heartbeat = HeartbeatRequest::open();
         let mut eviction = AnnouncementEviction::default();
         let mut remote = RemoteEndpoints::new(|guid: &Guid| own.contains(guid), counter);
         let status = participant.status_listener();
@@ -119,8 +119,8 @@ impl DiscoveryEvents {
                         }
                     }
                     Some(DomainParticipantStatusEvent::RemoteWriterMatched { local_reader, remote_writer }) => {
-                        if let Some(nack) = first_sample.as_ref().filter(|_| is_current()) {
-                            nack.request_first_sample(&participant, local_reader, remote_writer);
+                        if let Some(request) = heartbeat.as_ref().filter(|_| is_current()) {
+                            request.send(&participant, local_reader, remote_writer);
                         }
                     }
                     Some(event) => {

@@ -8,7 +8,7 @@
 //!
 //! | module | RTPS submessage | purpose |
 //! |---|---|---|
-//! | `first_sample_nack` | NACK_FRAG | requests the first sample of a publisher that was matched late |
+//! | `heartbeat_request` | ACKNACK, NACK_FRAG, HEARTBEAT | requests a HEARTBEAT and the first sample of a publisher that was matched late |
 //! | `stalled_readers` | GAP | unblocks a writer stalled by a reader whose ACKNACKs acknowledge nothing |
 //! | `dispose` | DATA with PID_KEY_HASH | disposes of the participant or a writer |
 //! | `large_response` | DATA, GAP | delivers service responses longer than the path's MTU |
@@ -32,9 +32,9 @@ mod duplicate_node_name;
 mod endpoints;
 pub mod environment;
 mod fan_out;
-mod first_sample_nack;
 mod goal_event;
 mod health;
+mod heartbeat_request;
 mod inputs;
 mod large_response;
 mod lifecycle;

@@ -1,5 +1,5 @@
-//! Encoding of the RTPS messages that this node sends beside RustDDS: header, INFO_TS, INFO_DST, NACK_FRAG, GAP and
-//! DATA with inline QoS.
+//! Encoding of the RTPS messages that this node sends beside RustDDS: header, INFO_TS, INFO_DST, ACKNACK, NACK_FRAG,
+//! HEARTBEAT, GAP and DATA with inline QoS.
 //!
 //! All fields are little endian. Section numbers refer to RTPS 2.5.
 
@@ -12,6 +12,8 @@ const PROTOCOL_VERSION: [u8; 2] = [2, 4];
 const VENDOR: [u8; 2] = [0x01, 0x12];
 
 // Kinds of submessages (9.4.5.1.1).
+const SUBMESSAGE_ACKNACK: u8 = 0x06;
+const SUBMESSAGE_HEARTBEAT: u8 = 0x07;
 const SUBMESSAGE_GAP: u8 = 0x08;
 const SUBMESSAGE_INFO_TS: u8 = 0x09;
 const SUBMESSAGE_INFO_DST: u8 = 0x0e;
@@ -147,6 +149,32 @@ impl Message {
         self
     }
 
+    /// Appends an ACKNACK of `reader` that has received nothing from `writer`, not even its first sequence number, and
+    /// requests a HEARTBEAT (8.3.8.1). `count` numbers the ACKNACKs of the reader.
+    pub(super) fn initial_acknack(mut self, reader: EntityId, writer: EntityId, count: u32) -> Self {
+        let octets = &mut self.0;
+        octets.extend([SUBMESSAGE_ACKNACK, FLAG_LITTLE_ENDIAN, 24, 0]);
+        octets.extend(reader);
+        octets.extend(writer);
+        // Empty set from 0 (9.4.2.6), then the count.
+        octets.extend([0; 12]);
+        octets.extend(count.to_le_bytes());
+        self
+    }
+
+    /// Appends a HEARTBEAT of a writer without samples as last submessage and returns the octets; it requests an ACKNACK
+    /// (8.3.8.6). `count` numbers the HEARTBEATs of the writer.
+    pub(super) fn empty_heartbeat(mut self, reader: EntityId, writer: EntityId, count: u32) -> Vec<u8> {
+        let octets = &mut self.0;
+        octets.extend([SUBMESSAGE_HEARTBEAT, FLAG_LITTLE_ENDIAN, 28, 0]);
+        octets.extend(reader);
+        octets.extend(writer);
+        octets.extend(sequence_number(1));
+        octets.extend(sequence_number(0));
+        octets.extend(count.to_le_bytes());
+        self.0
+    }
+
     /// Appends a NACK_FRAG as last submessage and returns the octets: `reader` requests the first fragment of sample
     /// `sample` of `writer` (8.3.8.10). `count` numbers the NACK_FRAGs of the reader.
     pub(super) fn nack_frag(
@@ -248,6 +276,17 @@ mod tests {
         // Sample 0·2³² + 1; fragments from 1, one bit, which is set; the count.
         assert_eq!(message[48..56], [0, 0, 0, 0, 1, 0, 0, 0]);
         assert_eq!(message[56..], [1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0x80, 7, 0, 0, 0]);
+    }
+
+    #[test]
+    fn an_acknack_and_a_heartbeat_have_the_layout_of_the_specification() {
+        let (reader, writer) = ([0, 0, 3, 4], [0, 0, 0x13, 3]);
+        let message = Message::from_participant(&GUID).initial_acknack(reader, writer, 9).0;
+        assert_eq!(message[20..32], [0x06, 1, 24, 0, 0, 0, 3, 4, 0, 0, 0x13, 3]);
+        assert_eq!(message[32..], [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0]);
+        let message = Message::from_participant(&GUID).empty_heartbeat(reader, writer, 9);
+        assert_eq!(message[20..32], [0x07, 1, 28, 0, 0, 0, 3, 4, 0, 0, 0x13, 3]);
+        assert_eq!(message[32..], [0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0]);
     }
 
     #[test]
