@@ -72,7 +72,7 @@ mod tests {
     use rustdds::{DomainParticipant, DomainParticipantStatusEvent, GUID, QosPolicies, StatusEvented};
 
     use super::*;
-    use crate::ros::dispose::DisposeMessage;
+    use crate::ros::dispose;
     use crate::ros::endpoints::create_topic;
     use crate::ros::environment::{DiscoveryRange, Environment};
     use crate::ros::participant::Participant;
@@ -161,8 +161,7 @@ mod tests {
         wait_for_discovery(&observer, &writers);
 
         let dispose = |writer: GUID, number: i64| {
-            DisposeMessage::for_writer(&writer.to_bytes(), number, &dds, DiscoveryRange::Localhost)
-                .send_once();
+            dispose::of_writer(&writer.to_bytes(), number, &dds, DiscoveryRange::Localhost).send_once();
         };
         let number = dispose_sequence_number(&context, 0, 0);
         dispose(first.guid(), number - 1);

@@ -16,7 +16,8 @@ use std::net::{Ipv4Addr, UdpSocket};
 
 use rustdds::{DomainParticipant, RTPSEntity};
 
-use super::dispose::{DISPOSED_AND_UNREGISTERED, PID_STATUS_INFO, SPDP_WRITER, discovery_port};
+use super::discovery_message::discovery_port;
+use super::dispose::{DISPOSED_AND_UNREGISTERED, PID_STATUS_INFO, SPDP_WRITER};
 use super::rtps::{Data, Guid, Message, PL_CDR_LE, is_secured};
 
 /// Number of announcements that RustDDS 0.15 keeps.

@@ -13,32 +13,42 @@
 //! [`HeartbeatRequest`] sends two datagrams as soon as a publisher is matched:
 //!
 //! ```text
+//! to the own reader: RTPS header (20), INFO_DST (4 + 12), INFO_REPLY (4 + 32): socket of the request |
+//!     HEARTBEAT (4 + 28): samples 1 to 0, count 1
 //! to the publisher: RTPS header (20) | INFO_DST (4 + 12) | ACKNACK (4 + 24): base 0, empty, count 1 |
 //!     NACK_FRAG (4 + 32): sample 1, fragments {1}, count 1
-//! to the own reader: RTPS header (20), INFO_DST (4 + 12), HEARTBEAT (4 + 28): samples 1 to 0, count 1
 //! ```
 //!
-//! - Fast DDS answers the ACKNACK with a HEARTBEAT, since its base is 0.
+//! - The empty HEARTBEAT in the name of the publisher lets RustDDS spend count 1 for an ACKNACK that goes nowhere. The
+//!   publisher has used count 1 for the HEARTBEAT at the match.
+//! - Fast DDS answers the ACKNACK with a HEARTBEAT, since its base is 0 and its count new. To that, RustDDS answers
+//!   with count 2, which is new, too.
 //! - The NACK_FRAG reports the first fragment of sample 1 as missing. Fast DDS repeats the whole sample with a HEARTBEAT,
 //!   if it still has it. RustDDS discards samples that it has already received. RustDDS never uses count 1 for a
 //!   NACK_FRAG: its first two counts go to ACKNACKs.
-//! - Fast DDS discards the next ACKNACK of RustDDS, whose count is 1 as well. The empty HEARTBEAT in the name of the
-//!   publisher lets RustDDS spend that count at once. The answer to the publisher's own HEARTBEAT has count 2. The
-//!   publisher has used count 1 for the HEARTBEAT at the match.
+//!
+//! The same holds for the publishers of Fast DDS that announce its endpoints. Those of a participant that is older than
+//! the node would be known after their heartbeat period of 1 s. So their HEARTBEATs are requested if no endpoint is
+//! known 0.15 s after the participant. An earlier request would reach participants that do not know the node yet.
 
 use std::{
     io,
-    net::{Ipv4Addr, SocketAddr, UdpSocket},
+    net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket},
 };
 
-use rustdds::{DomainParticipant, GUID};
+use rustdds::{DomainParticipant, GUID, RTPSEntity};
 use tracing::debug;
 
-use super::dispose::user_port;
-use super::rtps::{Guid, Message, entity, is_secured};
+use super::discovery_message::{DiscoveryMessage, discovery_port, user_port};
+use super::environment::DiscoveryRange;
+use super::rtps::{EntityId, Guid, Message, entity, is_secured};
 
 /// First two octets of the participant id of Fast DDS (RTPS 2.5, 9.3.1.1).
 const VENDOR_FAST_DDS: [u8; 2] = [0x01, 0x0f];
+/// Writers of the announcements of publishers and subscriptions (9.3.1.3). The last octet of their readers is
+/// `READER_KIND`.
+const ANNOUNCEMENT_WRITERS: [EntityId; 2] = [[0, 0, 3, 0xc2], [0, 0, 4, 0xc2]];
+const READER_KIND: u8 = 0xc7;
 /// Mask of an entity kind that is zero for endpoints of the application.
 const BUILT_IN: u8 = 0xf0;
 
@@ -46,18 +56,24 @@ const BUILT_IN: u8 = 0xf0;
 const COUNT: u32 = 1;
 
 /// Socket that requests a HEARTBEAT from each newly matched publisher.
-pub(super) struct HeartbeatRequest(UdpSocket);
+pub(super) struct HeartbeatRequest {
+    socket: UdpSocket,
+    /// Address of the socket, which reads nothing.
+    address: SocketAddrV4,
+}
 
 impl HeartbeatRequest {
     /// Opens the socket. Returns `None` and logs the reason if the system provides none.
     pub(super) fn open() -> Option<Self> {
-        match socket() {
-            Ok(socket) => Some(HeartbeatRequest(socket)),
-            Err(error) => {
-                debug!("no HEARTBEAT is requested from publishers: no UDP socket: {error}");
-                None
-            }
-        }
+        let open = || {
+            let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
+            socket.set_nonblocking(true)?;
+            let address = SocketAddrV4::new(Ipv4Addr::LOCALHOST, socket.local_addr()?.port());
+            Ok::<_, io::Error>(HeartbeatRequest { socket, address })
+        };
+        open()
+            .inspect_err(|error| debug!("no HEARTBEAT is requested from publishers: no UDP socket: {error}"))
+            .ok()
     }
 
     /// Requests a HEARTBEAT and the first sample of a publisher that has just been matched with a reader of `participant`.
@@ -66,29 +82,75 @@ impl HeartbeatRequest {
         if is_secured() || !needs_request(&own, &other) {
             return;
         }
+        let Some(port) = user_port(participant.domain_id(), participant.participant_id()) else { return };
+        self.send_empty_heartbeat(&own, &other, port);
         let request = request(&own, &other);
         for to in addresses(participant, writer) {
             // The publisher may have exited already.
-            let _ = self.0.send_to(&request, to);
-        }
-        if let Some(port) = user_port(participant.domain_id(), participant.participant_id()) {
-            // Without it, the publisher discards the next ACKNACK.
-            let _ = self.0.send_to(&empty_heartbeat(&own, &other), (Ipv4Addr::LOCALHOST, port));
+            let _ = self.socket.send_to(&request, to);
         }
     }
 }
 
-/// Returns true for an application writer of Fast DDS and an application reader.
-///
-/// Other middleware answers the ACKNACK of RustDDS. Built-in endpoints are excluded: they would answer only after 0.1 s.
-fn needs_request(reader: &Guid, writer: &Guid) -> bool {
-    writer[..2] == VENDOR_FAST_DDS && (reader[15] | writer[15]) & BUILT_IN == 0
+impl HeartbeatRequest {
+    /// Requests HEARTBEATs of the announcements of a participant, `other`, that `participant` has discovered without any
+    /// of its endpoints.
+    pub(super) fn send_to_participant(
+        &self,
+        participant: &DomainParticipant,
+        other: GUID,
+        range: DiscoveryRange,
+    ) {
+        let (own, other) = (participant.guid().to_bytes(), other.to_bytes());
+        if is_secured() || other[..2] != VENDOR_FAST_DDS || has_endpoints(participant, &other) {
+            return;
+        }
+        let Some(port) = discovery_port(participant.domain_id(), participant.participant_id()) else {
+            return;
+        };
+        for writer in ANNOUNCEMENT_WRITERS {
+            let [own, other] = [(own, reader_of(writer)), (other, writer)].map(endpoint);
+            self.send_empty_heartbeat(&own, &other, port);
+        }
+        DiscoveryMessage::new(announcement_request(&own, &other), participant, range).send_once();
+    }
+
+    /// Sends a HEARTBEAT in the name of a writer to a reader of this node at a port of this host.
+    fn send_empty_heartbeat(&self, reader: &Guid, writer: &Guid, port: u16) {
+        let heartbeat = empty_heartbeat(reader, writer, self.address);
+        // Without it, the publisher discards the next ACKNACK.
+        let _ = self.socket.send_to(&heartbeat, (Ipv4Addr::LOCALHOST, port));
+    }
 }
 
-fn socket() -> io::Result<UdpSocket> {
-    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
-    socket.set_nonblocking(true)?;
-    Ok(socket)
+/// Returns true if an endpoint of the participant `other` has been discovered.
+fn has_endpoints(participant: &DomainParticipant, other: &Guid) -> bool {
+    let is_own = |endpoint: GUID| endpoint.to_bytes()[..12] == other[..12];
+    participant.discovered_readers().iter().any(|reader| is_own(reader.reader_proxy.remote_reader_guid))
+        || participant
+            .discovered_writers()
+            .iter()
+            .any(|writer| is_own(writer.writer_proxy.remote_writer_guid))
+}
+
+/// Returns the built-in reader of a built-in writer.
+fn reader_of(writer: EntityId) -> EntityId {
+    [writer[0], writer[1], writer[2], READER_KIND]
+}
+
+/// Returns the datagram from the readers of the announcements of `other`.
+fn announcement_request(own: &Guid, other: &Guid) -> Vec<u8> {
+    let message = Message::from_participant(own).to(other);
+    let request = |message: Message, writer| message.initial_acknack(reader_of(writer), writer, COUNT);
+    ANNOUNCEMENT_WRITERS.into_iter().fold(message, request).octets()
+}
+
+/// Returns true for an application writer of Fast DDS and an application reader.
+///
+/// Other middleware answers the ACKNACK of RustDDS. Built-in writers are requested
+/// by participant.
+fn needs_request(reader: &Guid, writer: &Guid) -> bool {
+    writer[..2] == VENDOR_FAST_DDS && (reader[15] | writer[15]) & BUILT_IN == 0
 }
 
 /// Returns the unicast addresses at which a publisher receives ACKNACKs and NACK_FRAGs.
@@ -112,9 +174,16 @@ fn request(reader: &Guid, writer: &Guid) -> Vec<u8> {
         .nack_frag(from, of, 1, COUNT)
 }
 
-/// Returns the datagram in the name of the writer to the reader.
-fn empty_heartbeat(reader: &Guid, writer: &Guid) -> Vec<u8> {
-    Message::from_participant(writer).to(reader).empty_heartbeat(entity(reader), entity(writer), COUNT)
+/// Returns the datagram in the name of the writer to the reader, with the address of the reply.
+fn empty_heartbeat(reader: &Guid, writer: &Guid, reply: SocketAddrV4) -> Vec<u8> {
+    let message = Message::from_participant(writer).to(reader).reply_to(reply);
+    message.empty_heartbeat(entity(reader), entity(writer), COUNT)
+}
+
+/// Returns the GUID of an endpoint of the participant of `guid`.
+fn endpoint((mut guid, entity): (Guid, EntityId)) -> Guid {
+    guid[12..].copy_from_slice(&entity);
+    guid
 }
 
 #[cfg(test)]
@@ -140,10 +209,19 @@ mod tests {
 
     #[test]
     fn the_heartbeat_has_the_name_of_the_writer() {
-        let datagram = empty_heartbeat(&READER, &WRITER);
+        let datagram = empty_heartbeat(&READER, &WRITER, "127.0.0.1:9".parse().unwrap());
         assert_eq!(datagram[8..20], WRITER[..12]);
         assert_eq!(datagram[24..36], READER[..12]);
-        assert_eq!(datagram[36..48], [0x07, 1, 28, 0, 0, 0, 3, 4, 0, 0, 0x13, 3]);
+        assert_eq!(datagram[36..40], [0x0f, 1, 32, 0]);
+        assert_eq!(datagram[72..84], [0x07, 1, 28, 0, 0, 0, 3, 4, 0, 0, 0x13, 3]);
+    }
+
+    #[test]
+    fn a_participant_is_requested_to_repeat_its_announcements() {
+        let datagram = announcement_request(&READER, &WRITER);
+        assert_eq!(datagram.len(), 36 + 2 * 28);
+        assert_eq!(datagram[36..48], [0x06, 1, 24, 0, 0, 0, 3, 0xc7, 0, 0, 3, 0xc2]);
+        assert_eq!(datagram[64..76], [0x06, 1, 24, 0, 0, 0, 4, 0xc7, 0, 0, 4, 0xc2]);
     }
 
     #[test]

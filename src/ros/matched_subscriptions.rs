@@ -1,6 +1,6 @@
 //! Matched subscriptions of each topic: messages without subscribers are not built.
 
-use std::collections::HashSet;
+use std::collections::{HashSet, VecDeque};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -79,6 +79,9 @@ impl MatchedSubscriptionTracker {
     }
 }
 
+/// Time from the discovery of a participant until its endpoints are discovered, if no HEARTBEAT was missed.
+const ANNOUNCEMENT_TIME: Duration = Duration::from_millis(150);
+
 /// Handling of the status events of a participant: updates the matched subscriptions, requests a HEARTBEAT of
 /// matched writers, counts discovered endpoints, and records the participants.
 ///
@@ -104,6 +107,7 @@ impl DiscoveryEvents {
         let DiscoveryEvents { participant, tracker, own, counter, participants, is_current } = self;
         let is_current = || is_current.load(Ordering::Relaxed);
         let heartbeat = HeartbeatRequest::open();
+        let mut unannounced = VecDeque::new();
         let mut eviction = AnnouncementEviction::default();
         let mut remote = RemoteEndpoints::new(|guid: &Guid| own.contains(guid), counter);
         let status = participant.status_listener();
@@ -124,6 +128,9 @@ impl DiscoveryEvents {
                         }
                     }
                     Some(event) => {
+                        if let DomainParticipantStatusEvent::ParticipantDiscovered { dpd } = &event {
+                            unannounced.push_back((Instant::now() + ANNOUNCEMENT_TIME, dpd.guid));
+                        }
                         remote.update(&event);
                         participants.update(&event, Instant::now());
                         if is_expired(&event)
@@ -134,12 +141,23 @@ impl DiscoveryEvents {
                     }
                     None => return,
                 },
+                other = first_due(&mut unannounced) => if let Some(request) = &heartbeat {
+                    request.send_to_participant(&participant, other, own.range());
+                },
                 _ = timer.tick() => if is_current() {
                     tracker.borrow().poll(&participant);
                 },
             }
         }
     }
+}
+
+/// Waits until the first participant of a queue is due, and removes it. Waits forever if there is none.
+async fn first_due(queue: &mut VecDeque<(Instant, GUID)>) -> GUID {
+    let Some(&(due, participant)) = queue.front() else { return std::future::pending().await };
+    tokio::time::sleep_until(due.into()).await;
+    queue.pop_front();
+    participant
 }
 
 /// Returns true if the lease of a participant has expired.

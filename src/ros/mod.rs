@@ -27,6 +27,7 @@ mod clock;
 mod convert;
 mod diagnostics;
 pub mod discovery_gate;
+mod discovery_message;
 mod dispose;
 mod duplicate_node_name;
 mod endpoints;

@@ -11,7 +11,7 @@ use super::args::RosArgs;
 use super::environment::{DiscoveryRange, Environment};
 #[cfg(not(feature = "security"))]
 use super::security::SecurityError;
-use super::{dispose::DisposeMessage, security::Security};
+use super::{dispose, security::Security};
 
 /// Failure to join the network.
 #[derive(Debug, thiserror::Error)]
@@ -144,7 +144,7 @@ impl Participant {
     fn dispose(&mut self) -> Duration {
         let start = Instant::now();
         if let Some(participant) = self.participant.take() {
-            let message = DisposeMessage::for_participant(&participant, self.environment.range());
+            let message = dispose::of_participant(&participant, self.environment.range());
             // Dropped first, because RustDDS could announce the participant again after the dispose.
             drop(participant);
             message.send();

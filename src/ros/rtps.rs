@@ -1,8 +1,9 @@
-//! Encoding of the RTPS messages that this node sends beside RustDDS: header, INFO_TS, INFO_DST, ACKNACK, NACK_FRAG,
-//! HEARTBEAT, GAP and DATA with inline QoS.
+//! Encoding of the RTPS messages that this node sends beside RustDDS: header, INFO_TS, INFO_DST, INFO_REPLY, ACKNACK,
+//! NACK_FRAG, HEARTBEAT, GAP and DATA with inline QoS.
 //!
 //! All fields are little endian. Section numbers refer to RTPS 2.5.
 
+use std::net::SocketAddrV4;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -17,6 +18,7 @@ const SUBMESSAGE_HEARTBEAT: u8 = 0x07;
 const SUBMESSAGE_GAP: u8 = 0x08;
 const SUBMESSAGE_INFO_TS: u8 = 0x09;
 const SUBMESSAGE_INFO_DST: u8 = 0x0e;
+const SUBMESSAGE_INFO_REPLY: u8 = 0x0f;
 const SUBMESSAGE_NACK_FRAG: u8 = 0x12;
 const SUBMESSAGE_DATA: u8 = 0x15;
 // Flags of submessages (9.4.5.1.2), and of DATA (9.4.5.3.1).
@@ -26,6 +28,8 @@ const FLAG_DATA: u8 = 0x04;
 const FLAG_KEY: u8 = 0x08;
 /// Octets from this field to the inline QoS: reader id, writer id, sequence number (9.4.5.3).
 const OCTETS_TO_INLINE_QOS: u16 = 16;
+/// Kind of a locator with an IPv4 address (9.3.2.3).
+const LOCATOR_UDP_V4: u32 = 1;
 /// End of a parameter list (9.4.2.11).
 const PID_SENTINEL: u16 = 0x0001;
 
@@ -149,6 +153,19 @@ impl Message {
         self
     }
 
+    /// Appends INFO_REPLY: replies to the submessages that follow go to `address` (8.3.8.8).
+    ///
+    /// RustDDS 0.15 reads an octet more than the specification has: 0 without multicast addresses.
+    pub(super) fn reply_to(mut self, address: SocketAddrV4) -> Self {
+        self.0.extend([SUBMESSAGE_INFO_REPLY, FLAG_LITTLE_ENDIAN, 32, 0]);
+        for word in [1, LOCATOR_UDP_V4, u32::from(address.port()), 0, 0, 0] {
+            self.0.extend(u32::to_le_bytes(word));
+        }
+        self.0.extend(address.ip().octets());
+        self.0.extend([0; 4]);
+        self
+    }
+
     /// Appends an ACKNACK of `reader` that has received nothing from `writer`, not even its first sequence number, and
     /// requests a HEARTBEAT (8.3.8.1). `count` numbers the ACKNACKs of the reader.
     pub(super) fn initial_acknack(mut self, reader: EntityId, writer: EntityId, count: u32) -> Self {
@@ -160,6 +177,11 @@ impl Message {
         octets.extend([0; 12]);
         octets.extend(count.to_le_bytes());
         self
+    }
+
+    /// Returns the octets.
+    pub(super) fn octets(self) -> Vec<u8> {
+        self.0
     }
 
     /// Appends a HEARTBEAT of a writer without samples as last submessage and returns the octets; it requests an ACKNACK
@@ -279,9 +301,17 @@ mod tests {
     }
 
     #[test]
+    fn an_info_reply_has_one_ipv4_locator() {
+        let message = Message::from_participant(&GUID).reply_to("127.0.0.1:7413".parse().unwrap()).octets();
+        assert_eq!(message[20..32], [0x0f, 1, 32, 0, 1, 0, 0, 0, 1, 0, 0, 0]);
+        assert_eq!(message[32..36], [0xf5, 0x1c, 0, 0]);
+        assert_eq!(message[36..], [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 127, 0, 0, 1, 0, 0, 0, 0]);
+    }
+
+    #[test]
     fn an_acknack_and_a_heartbeat_have_the_layout_of_the_specification() {
         let (reader, writer) = ([0, 0, 3, 4], [0, 0, 0x13, 3]);
-        let message = Message::from_participant(&GUID).initial_acknack(reader, writer, 9).0;
+        let message = Message::from_participant(&GUID).initial_acknack(reader, writer, 9).octets();
         assert_eq!(message[20..32], [0x06, 1, 24, 0, 0, 0, 3, 4, 0, 0, 0x13, 3]);
         assert_eq!(message[32..], [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0]);
         let message = Message::from_participant(&GUID).empty_heartbeat(reader, writer, 9);

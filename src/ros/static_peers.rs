@@ -10,7 +10,7 @@ use std::thread;
 
 use tracing::warn;
 
-use super::dispose::discovery_port;
+use super::discovery_message::discovery_port;
 use super::own_participants::OwnParticipants;
 
 /// Number of participants of this host to which RustDDS 0.15 sends its announcement.

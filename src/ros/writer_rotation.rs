@@ -18,7 +18,7 @@ use tokio::time::MissedTickBehavior;
 use tracing::warn;
 
 use super::announced_writers::dispose_sequence_number;
-use super::dispose::DisposeMessage;
+use super::dispose;
 use super::environment::DiscoveryRange;
 use super::remote_participants::RemoteParticipants;
 use super::renewal::Renewal;
@@ -158,7 +158,7 @@ impl RotatedTopics {
                     let participant = owner.context.domain_participant();
                     let number =
                         dispose_sequence_number(&owner.context, WRITERS_OUTSIDE_NODES, owner.disposed);
-                    DisposeMessage::for_writer(&writer, number, &participant, owner.range).send_once();
+                    dispose::of_writer(&writer, number, &participant, owner.range).send_once();
                 }
                 owner.disposed += 1;
             });
