@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import signal
 import subprocess
 import time
 from collections.abc import Iterator
@@ -14,7 +15,10 @@ from control_msgs.action import FollowJointTrajectory
 from lifecycle_msgs.msg import State, Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
 from rclpy.action import ActionClient
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
 from virtual_axes.msg import TrajectoryResult as R
 
 from motion import go_home
@@ -47,14 +51,8 @@ class Manager(AxesClient):
         return self.call(ChangeState, "change_state", request, timeout=timeout).success
 
     def clean_up(self) -> None:
-        """Requests the transition cleanup and waits for the participant that serves from then on."""
-        assert isinstance(self.process, Node)
-        text = "waiting for the transition configure"
-        count = self.process.output().count(text)
+        """Requests the transition cleanup; the participant that serves from then on responds."""
         assert self.change("cleanup")
-        self.wait_for(lambda: self.process.output().count(text) > count, 20, "the restart")
-        # The previous participant is forgotten, and the new one is discovered.
-        time.sleep(1.0)
         assert self.state() == State.PRIMARY_STATE_UNCONFIGURED
 
     def available(self, service: str = "get_available_transitions") -> list[tuple[int, str, str, str]]:
@@ -244,3 +242,35 @@ def test_an_unconfigured_node_shuts_down_and_ends() -> None:
         assert manager.change(Transition.TRANSITION_UNCONFIGURED_SHUTDOWN)
         assert manager.state() == State.PRIMARY_STATE_FINALIZED
         assert process.stop() == 0
+
+
+def test_the_response_to_a_cleanup_reaches_a_new_client_and_the_next_request_is_served(manager: Manager) -> None:
+    for _ in range(4):
+        assert manager.change("configure")
+        with Manager(manager.process) as client:
+            assert client.change("cleanup", timeout=15)
+            assert client.change("configure", timeout=15)
+        manager.clean_up()
+
+
+def test_a_signal_ends_the_process_during_a_transition() -> None:
+    """A deactivation does not end while the clock stands still."""
+    with Node(["-p", "use_sim_time:=true", "--", "--lifecycle"]) as process, Manager(process) as manager:
+        assert manager.change("configure") and manager.change("activate")
+        clock = manager.in_executor(lambda: manager.node.create_publisher(Clock, "/clock", 10))
+        psec = manager.in_executor(lambda: manager.node.create_publisher(JointTrajectory, "/psec", 10))
+        for publisher in (clock, psec):
+            manager.wait_for(publisher.get_subscription_count, 20, publisher.topic_name)
+        start = 10 * NANOSECONDS
+        for k in range(3):
+            clock.publish(Clock(clock=Time(nanoseconds=start + k * TSP_NS).to_msg()))
+            time.sleep(0.1)
+        psec.publish(joint_trajectory(["x"], [3.0], [[0.1]]))
+        manager.wait_for(lambda: "trajectory 1 of psec accepted" in process.output(), 20, "acceptance")
+        for k in range(3, 60):
+            clock.publish(Clock(clock=Time(nanoseconds=start + k * TSP_NS).to_msg()))
+        service = manager.in_executor(lambda: manager.node.create_client(ChangeState, f"{DEFAULT_NODE}/change_state"))
+        manager.wait_for(service.service_is_ready, 20, "service change_state")
+        service.call_async(ChangeState.Request(transition=Transition(label="deactivate")))
+        manager.wait_for(lambda: manager.state() == State.TRANSITION_STATE_DEACTIVATING, 8, "deactivating")
+        assert process.stop(signal.SIGTERM, timeout=5) == 0

@@ -75,6 +75,9 @@ pub fn check_names(
     Ok(())
 }
 
+/// Longest time for which a response waits for the discovery of its client. A request can arrive before the client's
+/// response reader is discovered, and a response written then would be lost.
+const CLIENT_TIMEOUT: Duration = Duration::from_secs(1);
 /// Depth of response writers, which limits acknowledged samples only: the middleware keeps unacknowledged samples at
 /// any depth. A list of all parameters has 20 kB.
 pub const RESPONSE_DEPTH: usize = 1;
@@ -246,6 +249,17 @@ where
 
     /// Sends the response to a request as soon as its client is discovered, then releases `permit`.
     pub fn respond<'a>(&'a self, id: RmwRequestId, response: A, permit: ResponsePermit) -> BoxFuture<'a, ()> {
+        self.respond_within(id, response, permit, CLIENT_TIMEOUT)
+    }
+
+    /// Sends a response as [`Service::respond`] does, when its client is discovered or after `timeout`.
+    pub fn respond_within<'a>(
+        &'a self,
+        id: RmwRequestId,
+        response: A,
+        permit: ResponsePermit,
+        timeout: Duration,
+    ) -> BoxFuture<'a, ()> {
         async move {
             let service = self.network.current();
             let large = match LargeResponses::encode(&response) {
@@ -255,7 +269,7 @@ where
                     return;
                 }
             };
-            if !service.wait_for_client(&id).await {
+            if !service.wait_for_client(&id, timeout).await {
                 tracing::debug!("the client of {} has left or was not discovered", self.label);
             }
             match service.write(id, response, large).await {

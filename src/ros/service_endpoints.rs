@@ -22,9 +22,6 @@ use super::readers::Readers;
 use super::rtps::Guid;
 use super::service::{RESPONSE_DEPTH, profile};
 
-/// Longest time for which a response waits for the discovery of its client. A request can arrive before the client's
-/// response reader is discovered, and a response written then would be lost.
-const CLIENT_TIMEOUT: Duration = Duration::from_secs(1);
 /// Period at which the discovery of the client is checked.
 const CLIENT_POLL: Duration = Duration::from_millis(5);
 /// Time from the discovery of a reader until the writer serves it.
@@ -174,11 +171,11 @@ where
     }
 
     /// Waits until the response reader of the client of request `id` is discovered. Returns false after the timeout.
-    pub(super) async fn wait_for_client(&self, id: &RmwRequestId) -> bool {
+    pub(super) async fn wait_for_client(&self, id: &RmwRequestId, timeout: Duration) -> bool {
         if self.is_client_discovered(id) {
             return true;
         }
-        let deadline = tokio::time::Instant::now() + CLIENT_TIMEOUT;
+        let deadline = tokio::time::Instant::now() + timeout;
         while !self.is_client_discovered(id) {
             if tokio::time::Instant::now() >= deadline {
                 return false;

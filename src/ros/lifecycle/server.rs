@@ -1,7 +1,7 @@
 //! Services of the lifecycle and `~/transition_event`.
 
 use std::sync::Arc;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use futures::StreamExt;
 use futures::future::BoxFuture;
@@ -27,16 +27,18 @@ use crate::ros::service::{Service, ServiceError, publisher};
 
 /// Number of requests that may wait.
 const DEPTH: usize = 10;
+/// Longest time for which the response to a cleanup waits until the new participant has discovered the client.
+const CLEANUP_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Request to execute a transition.
 #[derive(Debug)]
 pub struct TransitionRequest {
     /// Transition.
     pub transition: RequestedTransition,
+    /// Identity of the request.
+    pub id: RmwRequestId,
     /// Receiver of the result: true if the transition succeeded.
     pub done: oneshot::Sender<bool>,
-    /// Resolves when the response has been sent.
-    pub answered: oneshot::Receiver<()>,
 }
 
 /// Services of the lifecycle and the publisher of its transitions.
@@ -64,7 +66,6 @@ struct Execution {
     id: RmwRequestId,
     permit: ResponsePermit,
     done: oneshot::Receiver<bool>,
-    answered: oneshot::Sender<()>,
 }
 
 impl LifecycleServer {
@@ -85,8 +86,10 @@ impl LifecycleServer {
         })
     }
 
-    /// Serves until the node shuts down, from the state unconfigured on; sends each transition to `transitions`.
-    pub async fn serve(self, transitions: mpsc::Sender<TransitionRequest>) {
+    /// Serves until a cleanup or until the node shuts down, from the state unconfigured on; sends each transition to
+    /// `transitions`. Responds to `cleanup`, the request that has led to this state: its response comes when the next
+    /// request can be served.
+    pub async fn serve(self, transitions: mpsc::Sender<TransitionRequest>, cleanup: Option<RmwRequestId>) {
         let mut state = PrimaryState::Unconfigured;
         let mut execution: Option<Execution> = None;
         let mut requests = select_all([
@@ -97,29 +100,26 @@ impl LifecycleServer {
             self.graph.requests_as(|id, _| Request::Graph(id)),
         ]);
         let mut responses: FuturesUnordered<BoxFuture<'_, ()>> = FuturesUnordered::new();
+        if let Some(id) = cleanup {
+            let response = ChangeStateResponse { success: true };
+            responses.push(self.change.respond_within(id, response, None, CLEANUP_TIMEOUT));
+        }
         let limiter = ResponseLimiter::default();
         loop {
             tokio::select! {
                 biased;
                 Some(()) = responses.next(), if !responses.is_empty() => {}
                 is_successful = ended(&mut execution) => {
-                    let Some(Execution { description, id, permit, answered, .. }) = execution.take() else { continue };
+                    let Some(Execution { description, id, permit, .. }) = execution.take() else { continue };
                     if let Some((end, after)) = states::end(&description.goal_state, is_successful) {
                         self.publish(end).await;
                         state = after;
                     }
-                    let response = self.change.respond(id, ChangeStateResponse { success: is_successful }, permit);
                     if is_successful && description.transition.id == Transition::TRANSITION_CLEANUP {
-                        // Another participant serves the next requests.
-                        response.await;
-                        let _ = answered.send(());
+                        // Another participant responds, and serves the next requests.
                         return;
                     }
-                    responses.push(Box::pin(async {
-                        response.await;
-                        // The receiver is dropped without a waiting task.
-                        let _ = answered.send(());
-                    }));
+                    responses.push(self.change.respond(id, ChangeStateResponse { success: is_successful }, permit));
                 }
                 Some((permit, request)) = limiter.next(&mut requests) => match request {
                     Ok(Request::Change(id, request)) => {
@@ -135,10 +135,9 @@ impl LifecycleServer {
                         };
                         self.publish(description.clone()).await;
                         let (done, result) = oneshot::channel();
-                        let (answered, answer) = oneshot::channel();
                         // The receiver is dropped only at shutdown.
-                        let _ = transitions.send(TransitionRequest { transition, done, answered: answer }).await;
-                        execution = Some(Execution { description, id, permit, done: result, answered });
+                        let _ = transitions.send(TransitionRequest { transition, id, done }).await;
+                        execution = Some(Execution { description, id, permit, done: result });
                     }
                     Ok(Request::State(id)) => {
                         let current_state = match &execution {

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use futures::future::Either;
 use ros2_client::Node;
+use ros2_client::service::RmwRequestId;
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::timeout;
@@ -24,27 +25,27 @@ use virtual_axes_core::trajectory::{MotionId, Trajectory};
 
 /// Longest duration of a deactivation; a clock that stands still prevents its stop.
 const STOP_TIMEOUT: Duration = Duration::from_secs(10);
-/// Longest time for which a response is waited for.
-const RESPONSE_TIMEOUT: Duration = Duration::from_secs(2);
+/// Longest time in which the services of the lifecycle end.
+const SERVER_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Reason for which a node has ended its operation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) enum OperationEnd {
     /// Signal: the process ends.
     Signal,
-    /// Transition cleanup: the node starts again, unconfigured.
-    Cleanup,
+    /// Transition cleanup by this request: the node starts again, unconfigured.
+    Cleanup(RmwRequestId),
 }
 
 /// Lifecycle services and the requested transitions.
 pub(super) struct ManagedNode {
     transitions: mpsc::Receiver<TransitionRequest>,
     /// Task of the services, which ends with this value.
-    _server: JoinSet<()>,
+    server: JoinSet<()>,
 }
 
 impl ManagedNode {
-    /// Creates the lifecycle services of `node` and starts them.
+    /// Creates the lifecycle services of `node` and starts them; they respond to the request `cleanup` that has led here.
     ///
     /// # Errors
     /// [`NodeError`] naming the service that cannot be created.
@@ -52,12 +53,13 @@ impl ManagedNode {
         node: &mut Node,
         context: &EndpointContext,
         args: &RosArgs,
+        cleanup: Option<RmwRequestId>,
     ) -> Result<Self, NodeError> {
         let lifecycle = LifecycleServer::new(node, context, args)?;
         let (transitions_out, transitions) = mpsc::channel(1);
         let mut server = JoinSet::new();
-        server.spawn(lifecycle.serve(transitions_out));
-        Ok(ManagedNode { transitions, _server: server })
+        server.spawn(lifecycle.serve(transitions_out, cleanup));
+        Ok(ManagedNode { transitions, server })
     }
 
     /// Serves the parameters that `read` returns until `configure` succeeds; `parameters` are those of the start, served
@@ -119,7 +121,7 @@ impl ManagedNode {
                 () = signals.wait() => return OperationEnd::Signal,
                 request = self.transitions.recv() => request,
             };
-            let Some(TransitionRequest { transition, done, answered }) = request else {
+            let Some(TransitionRequest { transition, id, done }) = request else {
                 return OperationEnd::Signal;
             };
             match transition {
@@ -128,7 +130,10 @@ impl ManagedNode {
                     _ = done.send(commands.send(Command::Activate).await.is_ok());
                 }
                 RequestedTransition::Deactivate => {
-                    let is_stopped = deactivate(commands, stop()).await;
+                    let is_stopped = tokio::select! {
+                        () = signals.wait() => return OperationEnd::Signal,
+                        is_stopped = deactivate(commands, stop()) => is_stopped,
+                    };
                     if is_stopped {
                         info!("inactive");
                     } else {
@@ -141,11 +146,14 @@ impl ManagedNode {
                     // This participant does not answer with values of the past.
                     parameters.inspect(|task| task.abort());
                     _ = done.send(true);
-                    let _ = timeout(RESPONSE_TIMEOUT, answered).await;
-                    return OperationEnd::Cleanup;
+                    let _ = timeout(SERVER_TIMEOUT, self.server.join_next()).await;
+                    return OperationEnd::Cleanup(id);
                 }
                 RequestedTransition::Shutdown => {
-                    let _ = deactivate(commands, stop()).await;
+                    tokio::select! {
+                        () = signals.wait() => return OperationEnd::Signal,
+                        _ = deactivate(commands, stop()) => {}
+                    }
                     info!("finalized; a signal ends the process");
                     _ = done.send(true);
                 }

@@ -17,6 +17,7 @@ use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 use futures::FutureExt;
+use ros2_client::service::RmwRequestId;
 use tokio::sync::{Mutex, mpsc, oneshot, watch};
 use tokio::task::JoinSet;
 
@@ -74,13 +75,18 @@ pub fn run(
         let _context = runtime.enter();
         ShutdownSignals::new()?
     };
+    let mut cleanup = None;
     let (participants, result) = loop {
         let gate = ClosedGate::new();
         let participants = OwnParticipants::new(Participant::open_with(environment, security)?);
         let (start, log) = (parameters.clone(), Arc::clone(&log));
-        let result = runtime.block_on(serve(args, &participants, gate, read, start, &mut signals, log));
+        let begin = Begin { parameters: start, gate, cleanup };
+        let result = runtime.block_on(serve(args, &participants, begin, read, &mut signals, log));
         match result {
-            Ok(OperationEnd::Cleanup) => participants.shutdown(),
+            Ok(OperationEnd::Cleanup(request)) => {
+                participants.shutdown();
+                cleanup = Some(request);
+            }
             Ok(OperationEnd::Signal) => break (participants, Ok(())),
             Err(error) => break (participants, Err(error)),
         }
@@ -91,14 +97,23 @@ pub fn run(
     result
 }
 
+/// Begin of the operation with a participant.
+struct Begin {
+    /// Parameters of the start.
+    parameters: Parameters,
+    /// Gate that opens when all endpoints exist.
+    gate: ClosedGate,
+    /// Request of the cleanup that has ended the operation before.
+    cleanup: Option<RmwRequestId>,
+}
+
 /// Creates the node, runs it until a signal or a cleanup, and shuts it down. Other participants discover it with all
-/// its endpoints, when `gate` opens; a managed node with those of its lifecycle and parameters.
+/// its endpoints, when the gate opens; a managed node with those of its lifecycle and parameters.
 async fn serve(
     args: &RosArgs,
     participants: &OwnParticipants,
-    gate: ClosedGate,
+    Begin { parameters, gate, cleanup }: Begin,
     read: &(dyn Fn() -> Result<Parameters, String> + Sync),
-    parameters: Parameters,
     signals: &mut ShutdownSignals,
     log: Arc<Mutex<mpsc::Receiver<LogRecord>>>,
 ) -> Result<OperationEnd, NodeError> {
@@ -117,7 +132,7 @@ async fn serve(
     let discovery = DiscoveryWatch::of_first(participants, args, context.domain_participant());
     let mut gate = Some(gate);
     let (configured, mut managed) = if args.is_managed() {
-        let mut managed = ManagedNode::start(&mut node, &context, args)?;
+        let mut managed = ManagedNode::start(&mut node, &context, args, cleanup)?;
         gate = None;
         match managed.wait_for_configuration(&services, parameters, read, signals, configure).await {
             Some((configured, done)) => (configured, Some((managed, Some(done)))),
