@@ -155,6 +155,11 @@ def test_an_offset_of_the_velocity_setpoint_moves_an_axis_at_rest_by_its_gain(ma
     [
         ({"action": "torque"}, 'action \'torque\': must be "psec" or "velocity"'),
         ({"axes": ["w"]}, "must be some of x, y, z, a, c"),
+        ({"axes": ["x", "x"]}, "each once"),
+        ({"axes": "xy"}, "must be some of x, y, z, a, c"),
+        ({"motion": np.zeros((5, 5))}, "no axis moves"),
+        ({"motion": None}, "motion None: must be an array"),
+        ({"motion": lambda random: None}, "motion None: must be an array"),
         ({"residual": 0.0}, "residual 0.0"),
         ({"motion": np.zeros((5, 2)), "axes": ["x"]}, "shape"),
         ({"motion": "nowhere"}, "nowhere"),
@@ -174,6 +179,21 @@ def test_a_step_without_a_reset_or_with_a_wrong_action_is_named(machine: va.Mach
     env.reset(seed=1)
     with pytest.raises(gymnasium.error.InvalidAction, match=r"shape \(1, 3\); it needs \(1, 2\)"):
         env.step(np.zeros(3))
+    for value in (1.5, -3.0, np.nan):
+        with pytest.raises(gymnasium.error.InvalidAction, match=rf"value {value:g}; it must be within ±1"):
+            env.step(np.array([0.0, value]))
+
+
+def test_a_machine_that_has_ended_ignores_its_action(machine: va.Machine) -> None:
+    envs = ContouringVectorEnv(2, machine=machine, motion=np.zeros((3, 5)), axes=["x"], settling=0)
+    with pytest.raises(ValueError, match="1 seeds for 2 machines"):
+        envs.reset(seed=[1])
+    envs.reset(seed=[1, 2])
+    for _ in range(3):
+        _, _, ended, _, _ = envs.step(np.zeros((2, 1)))
+    assert ended.all()
+    _, rewards, ended, _, _ = envs.step(np.full((2, 1), np.nan))
+    assert not ended.any() and (rewards == 0).all()
 
 
 def test_the_programs_of_the_documentation_run() -> None:

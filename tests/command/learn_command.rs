@@ -56,6 +56,23 @@ fn part_programs_csv_files_and_other_machines_can_be_learned() {
 }
 
 #[test]
+fn motions_without_a_contour_minimize_the_error_of_the_axis() {
+    for (scenario, unit) in [("c-constant", "rad"), ("x-constant", "m")] {
+        let found = json(&["learn", scenario, "--iterations", "3", "--json"]);
+        let runs = found["iterations"].as_array().expect("a list");
+        let error =
+            |run: &serde_json::Value| run["learning_axes"][0]["max_error"].as_f64().expect("a number");
+        assert_eq!(runs[0]["learning_axes"][0]["unit"], unit);
+        let best = found["best"].as_u64().expect("an index") as usize;
+        assert!(best > 0 && error(&runs[best]) < 0.7 * error(&runs[0]), "{scenario}: {}", error(&runs[best]));
+        let least = runs.iter().map(error).fold(f64::INFINITY, f64::min);
+        assert_eq!(error(&runs[best]), least);
+    }
+    let text = printed(&["learn", "c-constant", "--iterations", "2", "--quiet"]);
+    assert!(text.starts_with("max error of an axis ") && text.contains(" mdeg → "), "{text}");
+}
+
+#[test]
 fn invalid_arguments_are_rejected_with_what_is_allowed() {
     let rejected = |arguments: &[&str], parts: &[&str]| {
         assert_rejected(&[&["learn", "ballbar"], arguments].concat(), parts);

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_core::text::escaped;
 use virtual_axes_core::trial::Figures;
-use virtual_axes_core::units::{DEGREE, Rounded, seconds};
+use virtual_axes_core::units::{MILLIDEGREE, Rounded, seconds};
 use virtual_axes_identify::learn::{LearningEnd, LearningIteration, LearningOptions, LearningResult};
 use virtual_axes_io::files::figures_json;
 use virtual_axes_report::{
@@ -41,14 +41,17 @@ impl Learned<'_> {
     pub fn verdict(&self) -> String {
         let runs = &self.found.iterations;
         let (first, best) = (&runs[0], &runs[self.found.best]);
-        let (name, unit) = match first.figures.contour {
-            Some(_) => ("max contour error", "µm"),
-            None => ("max error of an axis", "µrad"),
+        let name = if first.contour().is_some() { "max contour error" } else { "max error of an axis" };
+        let is_angle =
+            first.contour().is_none() && first.axes.iter().all(|axis| self.axis(axis.index).1 == "rad");
+        let error = |run: &LearningIteration| match is_angle {
+            true => format!("{:.3} mdeg", run.error() / MILLIDEGREE),
+            false => format!("{:.2} µm", run.error() * MICRO),
         };
         let mut lines = vec![format!(
-            "{name} {:.2} {unit} → {:.2} {unit} in iteration {} of {}",
-            first.error() * MICRO,
-            best.error() * MICRO,
+            "{name} {} → {} in iteration {} of {}",
+            error(first),
+            error(best),
             self.found.best,
             runs.len() - 1
         )];
@@ -144,7 +147,7 @@ impl Learned<'_> {
     fn errors(&self) -> Table {
         let mut columns = vec![TableColumn::new("iteration", "")];
         let runs = &self.found.iterations;
-        if runs[0].figures.contour.is_some() {
+        if runs[0].contour().is_some() {
             columns.push(TableColumn::new("contour max", "µm"));
             columns.push(TableColumn::new("contour RMS", "µm"));
         }
@@ -157,10 +160,10 @@ impl Learned<'_> {
         let cell = |value: f64| format!("{:.2}", value * MICRO);
         let of_axis = |index: usize, value: f64| match self.axis(index) {
             (_, "m") => cell(value),
-            _ => format!("{:.3}", value / DEGREE * 1e3),
+            _ => format!("{:.3}", value / MILLIDEGREE),
         };
         let row = |(number, run): (usize, &LearningIteration)| {
-            let contour = run.figures.contour.iter().flat_map(|contour| [contour.max, contour.rms]);
+            let contour = run.contour().into_iter().flat_map(|contour| [contour.max, contour.rms]);
             let axes = run.axes.iter();
             let axes = axes.flat_map(|error| [error.max, error.rms].map(|value| of_axis(error.index, value)));
             let best = if number == self.found.best && number > 0 {

@@ -225,8 +225,8 @@ fn length(motion: &ProgramMotion) -> f64 {
     }
 }
 
-/// Returns positions of a motion that contain the extreme ones of each joint, with the end as the last: exact without
-/// tool center point control; the control points, which enclose it, of a spline.
+/// Returns positions of a motion that contain the extreme ones of each joint, with the end as the last: exact for lines and
+/// arcs without tool center point control, samples otherwise.
 fn positions(motion: &ProgramMotion) -> Vec<Coordinates> {
     let mut fractions: Vec<f64> = match (&motion.kind, motion.tcp_length) {
         (_, Some(_)) => (0..SAMPLES).map(|step| f64::from(step) / f64::from(SAMPLES)).collect(),
@@ -238,22 +238,17 @@ fn positions(motion: &ProgramMotion) -> Vec<Coordinates> {
             let quadrants = (0..4).map(|step| (first + f64::from(step) * arc.sweep.signum()) * FRAC_PI_2);
             quadrants.map(|angle| (angle - from) / arc.sweep).filter(|fraction| *fraction < 1.0).collect()
         }
+        (MotionKind::Nurbs(spline), None) => {
+            let count = SAMPLES * spline.control.len() as u32;
+            (0..count).map(|step| f64::from(step) / f64::from(count)).collect()
+        }
         _ => Vec::new(),
     };
     fractions.push(1.0);
-    let mut positions: Vec<_> = fractions.into_iter().map(|fraction| at(motion, fraction)).collect();
-    if let MotionKind::Nurbs(spline) = &motion.kind {
-        let [first, second, _] = spline.plane.axes();
-        for (point, _) in &spline.control {
-            let mut position = motion.end;
-            (position[first], position[second]) = (point[0], point[1]);
-            positions.insert(0, position);
-        }
-    }
-    positions
+    fractions.into_iter().map(|fraction| at(motion, fraction)).collect()
 }
 
-/// Returns the position at a fraction of a line or arc.
+/// Returns the position at a fraction of a motion.
 fn at(motion: &ProgramMotion, fraction: f64) -> Coordinates {
     let mut position: Coordinates =
         std::array::from_fn(|axis| motion.start[axis] + fraction * (motion.end[axis] - motion.start[axis]));
@@ -263,6 +258,10 @@ fn at(motion: &ProgramMotion, fraction: f64) -> Coordinates {
         let (sin, cos) = (arc.sweep * fraction).sin_cos();
         position[first] = arc.center[0] + x * cos - y * sin;
         position[second] = arc.center[1] + x * sin + y * cos;
+    }
+    if let (MotionKind::Nurbs(spline), true) = (&motion.kind, fraction < 1.0) {
+        let [first, second, _] = spline.plane.axes();
+        [position[first], position[second]] = spline.point(fraction);
     }
     position
 }

@@ -12,7 +12,7 @@ pub struct PartProgramArguments {
     /// Feed override of a part program, 0 to 200 %: constant, or from times on, as in `0:100,2.5:0,4:120`.
     #[arg(long = "override", value_name = "PERCENT|S:PERCENT,…", allow_hyphen_values = true)]
     feed_override: Option<String>,
-    /// M codes that have no effect in a part program, with the words of their lines: 7,M110. Each one found is noted.
+    /// M codes that have no effect in a part program: 7,M110. Of a line without other codes only F, S and T remain. Each one found is noted.
     #[arg(long, value_name = "M_CODES", value_delimiter = ',', value_parser = parse_m_code)]
     pub ignore: Vec<u32>,
     /// Bound of the chord error of a part program's setpoints as a polyline, µm: slows the feed in curves [default: none].

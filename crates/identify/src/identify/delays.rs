@@ -138,9 +138,10 @@ pub(super) fn fit_delay(
     let best = |tried: &[(i64, DVector<f64>)]| {
         tried.iter().min_by(|a, b| a.1.norm_squared().total_cmp(&b.1.norm_squared())).map(|(m, _)| *m)
     };
+    let is_tried = |tried: &[(i64, DVector<f64>)], m: i64| tried.iter().any(|(known, _)| *known == m);
     let near = best(&tried)?;
     let between =
-        ((near - coarse).max(0)..=(near + coarse).min(longest)).filter(|m| m % coarse != 0).collect();
+        ((near - coarse).max(0)..=(near + coarse).min(longest)).filter(|m| !is_tried(&tried, *m)).collect();
     tried.extend(evaluate(between, &residuals));
     let at_best = best(&tried)?;
 
@@ -174,7 +175,7 @@ pub(super) fn fit_delay(
             if !(0..=longest).contains(&next) {
                 return end;
             }
-            if !tried.iter().any(|(known, _)| *known == next) {
+            if !is_tried(&tried, next) {
                 let block = (0..BLOCK).map(|k| next + k * step).filter(|m| (0..=longest).contains(m));
                 tried.extend(evaluate(block.collect(), &residuals));
             }

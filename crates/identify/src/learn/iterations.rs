@@ -2,13 +2,15 @@
 
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::design::LearningTuning;
-use virtual_axes_core::trial::{Figures, GridRows, Measures, SetpointSource, Tick, Trial, TrialOutcome};
+use virtual_axes_core::trial::{
+    ContourFigures, Figures, GridRows, Measures, SetpointSource, Tick, Trial, TrialOutcome,
+};
 
 use super::axis::LearningAxis;
 use super::error::LearningError;
 use super::learner::Learner;
 use super::setpoint_limits::SetpointExcess;
-use crate::tune::{Progress, Workload};
+use crate::tune::{Progress, Workload, has_contour};
 
 /// Largest number of iterations.
 pub const MAX_ITERATIONS: usize = 1000;
@@ -53,11 +55,16 @@ pub struct LearningIteration {
 }
 
 impl LearningIteration {
-    /// Returns the error that the learning minimizes: the largest contour error, m, or without linear axes the largest
-    /// error of an axis, rad.
+    /// Returns the error that the learning minimizes: the largest contour error, m. Without a contour, of one axis or of
+    /// rotary axes alone, the largest error of an axis, m or rad.
     pub fn error(&self) -> f64 {
         let of_axes = || self.axes.iter().map(|axis| axis.max).fold(0.0, f64::max);
-        self.figures.contour.map_or_else(of_axes, |contour| contour.max)
+        self.contour().map_or_else(of_axes, |contour| contour.max)
+    }
+
+    /// Returns the contour error of several axes, one of which is linear.
+    pub fn contour(&self) -> Option<ContourFigures> {
+        self.figures.contour.filter(|_| has_contour(&self.figures))
     }
 }
 

@@ -24,6 +24,7 @@ mod workload;
 pub use cascade::tune_cascade;
 pub use contour_gain::tune_contour_gain;
 pub use contrast::{Contrast, find_contrasts};
+pub(crate) use cost::has_contour;
 pub use cost::{Cost, CostError, CostTerm};
 pub use error::TuneError;
 pub use gpc::{GRID_LAMBDA, GRID_N2, GRID_NU, design_grid, fine_design_grid, tune_gpc, tune_gpc_from};

@@ -6,8 +6,8 @@ use virtual_axes_core::units::Rounded;
 
 /// Header of the time column.
 pub(super) const TIME: &str = "time";
-/// Maximum time, s: about three years.
-pub(super) const MAX_TIME: f64 = 1e8;
+/// Maximum time, s: 100 h, as of part programs.
+pub(super) const MAX_TIME: f64 = 360_000.0;
 
 /// Error of reading position setpoints from CSV, with file and line.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -71,7 +71,7 @@ pub enum PsecError {
         found: String,
     },
     /// A time is out of range.
-    #[error("{at}: {TIME} is {} s, must lie in 0 … {MAX_TIME} s", Rounded(*found))]
+    #[error("{at}: {TIME} is {} s, must lie in 0 … {MAX_TIME} s (100 h); is the column in s?", Rounded(*found))]
     Time {
         /// File and line.
         at: String,

@@ -64,8 +64,13 @@ impl State {
             .peck
             .filter(|_| matches!(code, 730 | 830))
             .map_or(1.0, |peck| (levels.retract - levels.bottom) / peck);
-        if repeats == 0 || f64::from(repeats) * pecks > MAX_PECKS {
-            return Err(format!("{name}: more than {MAX_PECKS} pecks in one line, or L0"));
+        if repeats == 0 {
+            return Err(format!("{name}: word L: 0 repetitions, must be 1 or more"));
+        }
+        let strokes = (f64::from(repeats) * pecks).ceil();
+        if strokes > MAX_PECKS {
+            let what = if cycle.peck.is_some() { "pecks" } else { "repetitions" };
+            return Err(format!("{name}: {strokes} {what} in one line; at most {MAX_PECKS} are allowed"));
         }
         let step = self.targets(block, false)?;
         let step = [first, second].map(|axis| step[axis] - self.position[axis]);

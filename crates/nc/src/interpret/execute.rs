@@ -25,12 +25,19 @@ impl State {
                 Setting::Name(name) => self.parameters.set_named(&name, value)?,
             }
         }
+        if self.spline.is_some() && block.is_ignored() {
+            return Ok(());
+        }
         if self.spline.is_some() && !block.is_empty() {
             return self.spline_line(block);
         }
         let codes = Codes::new(block)?;
         self.set_feed(block, &codes)?;
         self.set_spindle_and_tool(block, &codes)?;
+        if block.is_ignored() {
+            // The other words belong to the ignored codes.
+            return Ok(());
+        }
         self.set_coolant(&codes);
         self.dwell(block, &codes)?;
         self.set_plane_and_units(&codes);

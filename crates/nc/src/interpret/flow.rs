@@ -58,23 +58,7 @@ enum BlockKind {
 impl<R: BufRead + Seek> Interpreter<R> {
     /// Executes the O-word of the line at `place`.
     pub(super) fn execute_o_word(&mut self, place: Place) -> Outcome<()> {
-        let mut scanner = Scanner::new(&self.line.text, &self.state);
-        let Statement { label, keyword } = scanner.statement()?;
-        let (arguments, count) =
-            scanner.arguments().map_err(|reason| format!("O{label} {}: {reason}", keyword.name()))?;
-        let expected = match keyword {
-            Keyword::While | Keyword::If | Keyword::ElseIf | Keyword::Repeat => 1..=1,
-            Keyword::Call => 0..=LOCALS,
-            Keyword::Return | Keyword::EndSub => 0..=1,
-            _ => 0..=0,
-        };
-        if !expected.contains(&count) {
-            return Err(format!(
-                "O{label} {}: {count} expressions in brackets, expected {}",
-                keyword.name(),
-                expected.end()
-            ));
-        }
+        let (Statement { label, keyword }, arguments, count) = self.statement()?;
         let is_true = arguments[0] != 0.0;
         match keyword {
             Keyword::Program => Ok(()),
@@ -106,6 +90,28 @@ impl<R: BufRead + Seek> Interpreter<R> {
             Keyword::EndRepeat => self.end_repeat(&label),
             Keyword::Break | Keyword::Continue => self.leave(&label, keyword),
         }
+    }
+
+    /// Returns the O-word of the present line with the values of its expressions and their number.
+    fn statement(&self) -> Outcome<(Statement, [f64; LOCALS], usize)> {
+        let mut scanner = Scanner::new(&self.line.text, &self.state);
+        let Statement { label, keyword } = scanner.statement()?;
+        let (arguments, count) =
+            scanner.arguments().map_err(|reason| format!("O{label} {}: {reason}", keyword.name()))?;
+        let expected = match keyword {
+            Keyword::While | Keyword::If | Keyword::ElseIf | Keyword::Repeat => 1..=1,
+            Keyword::Call => 0..=LOCALS,
+            Keyword::Return | Keyword::EndSub => 0..=1,
+            _ => 0..=0,
+        };
+        if !expected.contains(&count) {
+            return Err(format!(
+                "O{label} {}: {count} expressions in brackets, expected {}",
+                keyword.name(),
+                expected.end()
+            ));
+        }
+        Ok((Statement { label, keyword }, arguments, count))
     }
 
     /// Executes the jump that a line has requested.
@@ -174,14 +180,11 @@ impl<R: BufRead + Seek> Interpreter<R> {
         while !is_true {
             let found =
                 self.skip_to(&label, Keyword::If, &[Keyword::ElseIf, Keyword::Else, Keyword::EndIf])?;
+            let (_, arguments, _) = self.statement()?;
             match found {
                 Keyword::EndIf => return Ok(()),
                 Keyword::Else => break,
-                _ => {
-                    let mut scanner = Scanner::new(&self.line.text, &self.state);
-                    scanner.statement()?;
-                    is_true = scanner.bracket()? != 0.0;
-                }
+                _ => is_true = arguments[0] != 0.0,
             }
         }
         self.open(label, BlockKind::If)
@@ -262,10 +265,8 @@ impl<R: BufRead + Seek> Interpreter<R> {
         match kind {
             BlockKind::Repeat(..) => self.end_repeat(label),
             _ => {
-                let mut scanner = Scanner::new(&self.line.text, &self.state);
-                scanner.statement()?;
-                let is_true = scanner.bracket()? != 0.0;
-                self.while_line(label.to_owned(), self.source.place(), is_true)
+                let (_, arguments, _) = self.statement()?;
+                self.while_line(label.to_owned(), self.source.place(), arguments[0] != 0.0)
             }
         }
     }
@@ -282,7 +283,11 @@ impl<R: BufRead + Seek> Interpreter<R> {
         };
         loop {
             let line = self.state.line;
-            if !self.source.read(&mut self.line.raw)? {
+            let read = self.source.read(&mut self.line.raw);
+            if read.is_err() {
+                self.state.line = self.source.line();
+            }
+            if !read? {
                 return Err(missing());
             }
             // Other lines are not executed, and may be incomplete.
@@ -362,7 +367,14 @@ impl<R: BufRead + Seek> Interpreter<R> {
         let mut found = HashMap::new();
         let mut line = LineText::default();
         self.source.rewind()?;
-        while self.source.read_raw(&mut line.raw)? {
+        loop {
+            let read = self.source.read_raw(&mut line.raw);
+            if read.is_err() {
+                self.state.line = self.source.line();
+            }
+            if !read? {
+                break;
+            }
             let has_o = line.raw.iter().any(|byte| byte.eq_ignore_ascii_case(&b'o'));
             if !has_o || line.compact().is_err() || self.is_skipped(&line) || !is_o_word(&line.text) {
                 continue;

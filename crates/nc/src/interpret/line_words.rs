@@ -138,6 +138,11 @@ impl LineWords {
         self.unused == 0 && self.g.is_empty() && self.m.is_empty() && self.settings.is_empty()
     }
 
+    /// Returns true if all codes are ignored: then the words belong to them.
+    pub(super) fn is_ignored(&self) -> bool {
+        !self.ignored.is_empty() && self.g.is_empty() && self.m.is_empty()
+    }
+
     /// Rejects words that no code has used.
     pub(super) fn require_used(&self) -> Outcome<()> {
         if self.unused == 0 || !self.ignored.is_empty() {

@@ -51,14 +51,16 @@ impl State {
         let system = system.ok_or("G10 requires P, the coordinate system 1 to 9, or 0 for the active one")?;
         let system = system.checked_sub(1).unwrap_or(self.offsets.active);
         let level = block.take_integer('L')?;
-        for (axis, value) in self.take_axes(block)?.into_iter().enumerate() {
+        let level = level.filter(|level| [2, 20].contains(level)).ok_or("G10 requires L2 or L20")?;
+        let words = self.take_axes(block)?;
+        if words.iter().all(Option::is_none) {
+            return Err(format!("G10 L{level} requires at least one axis word"));
+        }
+        for (axis, value) in words.into_iter().enumerate() {
             let Some(value) = value else { continue };
             let rest = self.origin(axis) - self.options.work_offsets[self.offsets.active][axis];
-            self.options.work_offsets[system][axis] = match level {
-                Some(2) => value,
-                Some(20) => self.position[axis] - rest - value,
-                _ => return Err("G10 requires L2 or L20".to_owned()),
-            };
+            self.options.work_offsets[system][axis] =
+                if level == 2 { value } else { self.position[axis] - rest - value };
         }
         Ok(())
     }
@@ -103,8 +105,10 @@ impl State {
                 self.offsets.tool_length = words[2].ok_or("G43.1 requires Z, the tool length")?;
             }
             Some(code) => {
-                let tool = block.take_integer('H')?.unwrap_or(self.modal.tool);
-                let length = self.tool_length(tool)?;
+                let length = match block.take_integer('H')? {
+                    Some(0) => 0.0,
+                    tool => self.tool_length(tool.unwrap_or(self.modal.tool))?,
+                };
                 self.leave_tcp();
                 match code {
                     434 => self.enter_tcp(length)?,

@@ -125,16 +125,32 @@ impl<R: BufRead + Seek> LineSource<R> {
                 line.drain(..3);
             }
             let text = line.trim_ascii();
-            // A percent sign encloses the program: before its first line, and after its last.
-            if text.starts_with(b"%") {
+            // A percent sign encloses the program: before its first line with text, and after its last.
+            if let Some(rest) = text.strip_prefix(b"%") {
+                if !is_comment(rest) {
+                    return Err("% encloses the program and is alone on its line".to_owned());
+                }
                 if self.has_text {
                     return Ok(false);
                 }
                 self.has_text = true;
                 continue;
             }
-            self.has_text |= !text.is_empty();
+            self.has_text |= !is_comment(text);
             return Ok(true);
         }
+    }
+}
+
+/// Returns true if a line, or its rest, has nothing but comments.
+fn is_comment(text: &[u8]) -> bool {
+    let text = text.trim_ascii();
+    match text.first() {
+        None | Some(b';') => true,
+        Some(b'(') => match text.iter().position(|byte| *byte == b')') {
+            Some(end) => is_comment(&text[end + 1..]),
+            None => false,
+        },
+        Some(_) => false,
     }
 }

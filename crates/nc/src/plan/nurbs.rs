@@ -57,9 +57,9 @@ impl SplineTable {
         // Parts of the curve without chords, the next one last.
         let mut parts: Vec<_> = (0..intervals).rev().map(|i| (knot(i), knot(i + 1), 0)).collect();
         while let Some((from, to, halvings)) = parts.pop() {
-            let position = if to < 1.0 { point(nurbs, to) } else { plane.map(|joint| ends[1][joint]) };
+            let position = if to < 1.0 { nurbs.point(to) } else { plane.map(|joint| ends[1][joint]) };
             let distance = |share: f64| {
-                let curve = point(nurbs, from + share * (to - from));
+                let curve = nurbs.point(from + share * (to - from));
                 let chord = [0, 1].map(|k| before.position[k] + share * (position[k] - before.position[k]));
                 (curve[0] - chord[0]).hypot(curve[1] - chord[1])
             };
@@ -138,33 +138,35 @@ fn intervals(nurbs: &Nurbs) -> usize {
     nurbs.control.len().saturating_sub(degree(nurbs)).max(1)
 }
 
-/// Returns the point of a clamped rational B-spline with uniform inner knots at parameter `t` from 0 to 1, by de Boor's
-/// algorithm in homogeneous coordinates.
-fn point(nurbs: &Nurbs, t: f64) -> [f64; 2] {
-    let count = nurbs.control.len();
-    if count == 0 {
-        return [f64::NAN; 2];
-    }
-    let (degree, spans) = (degree(nurbs), intervals(nurbs));
-    let u = (t * spans as f64).clamp(0.0, spans as f64);
-    let span = (u as usize).min(spans - 1);
-    let knot = |i: usize| (i as f64 - degree as f64).clamp(0.0, spans as f64);
-    let mut points: Vec<[f64; 3]> = (span..=span + degree)
-        .map(|i| {
-            let ([x, y], w) = nurbs.control[i];
-            [x * w, y * w, w]
-        })
-        .collect();
-    for r in 1..=degree {
-        for j in (r..=degree).rev() {
-            let (low, high) = (knot(span + j), knot(span + j + degree + 1 - r));
-            let alpha = if high > low { (u - low) / (high - low) } else { 0.0 };
-            let (before, here) = (points[j - 1], points[j]);
-            points[j] = std::array::from_fn(|k| before[k] + (here[k] - before[k]) * alpha);
+impl Nurbs {
+    /// Returns the point (m) at parameter `t` from 0 to 1, by de Boor's algorithm in homogeneous coordinates. Inner knots
+    /// are uniform; both ends are clamped. NaN without control points.
+    pub fn point(&self, t: f64) -> [f64; 2] {
+        let count = self.control.len();
+        if count == 0 {
+            return [f64::NAN; 2];
         }
+        let (degree, spans) = (degree(self), intervals(self));
+        let u = (t * spans as f64).clamp(0.0, spans as f64);
+        let span = (u as usize).min(spans - 1);
+        let knot = |i: usize| (i as f64 - degree as f64).clamp(0.0, spans as f64);
+        let mut points: Vec<[f64; 3]> = (span..=span + degree)
+            .map(|i| {
+                let ([x, y], w) = self.control[i];
+                [x * w, y * w, w]
+            })
+            .collect();
+        for r in 1..=degree {
+            for j in (r..=degree).rev() {
+                let (low, high) = (knot(span + j), knot(span + j + degree + 1 - r));
+                let alpha = if high > low { (u - low) / (high - low) } else { 0.0 };
+                let (before, here) = (points[j - 1], points[j]);
+                points[j] = std::array::from_fn(|k| before[k] + (here[k] - before[k]) * alpha);
+            }
+        }
+        let [x, y, w] = points[degree];
+        [x / w, y / w]
     }
-    let [x, y, w] = points[degree];
-    [x / w, y / w]
 }
 
 #[cfg(test)]
@@ -178,7 +180,7 @@ mod tests {
         let control = vec![([1.0, 0.0], 1.0), ([1.0, 1.0], w), ([0.0, 1.0], 1.0)];
         let nurbs = Nurbs { plane: Plane::Xy, order: 3, control };
         for i in 0..=10 {
-            let [x, y] = point(&nurbs, f64::from(i) / 10.0);
+            let [x, y] = nurbs.point(f64::from(i) / 10.0);
             assert!((x.hypot(y) - 1.0).abs() < 1e-15);
         }
     }

@@ -31,6 +31,8 @@ fn the_end_of_the_file_ends_the_program() {
     assert_eq!(end(""), Some((1, ProgramEvent::End)));
     assert_eq!(end("G0 X1\r\nM30\r\nG99 nonsense"), Some((2, ProgramEvent::End)));
     assert_eq!(x_of("\u{feff}%\nO1234 (NAME)\nG0 X1\n%\nnot read"), [1000]);
+    // Comments before the first sign are no text.
+    assert_eq!(x_of("(part 7) (rev B)\n; of 2026\n % (start)\nG0 X1\n%\nnot read"), [1000]);
 }
 
 #[test]

@@ -47,6 +47,12 @@ fn invalid_words_are_rejected_with_their_line() {
         ("G92", "part.nc:1: G92 requires at least one axis word"),
         ("G0 G92 X1", "part.nc:1: G92 and G0 both use the axis words: program them in two lines"),
         ("G10 L2 P12 X1", "part.nc:1: G10 requires P, the coordinate system 1 to 9, or 0 for the active one"),
+        ("G10 P1", "part.nc:1: G10 requires L2 or L20"),
+        ("G10 L99 P1 X1", "part.nc:1: G10 requires L2 or L20"),
+        ("G10 L20 P1", "part.nc:1: G10 L20 requires at least one axis word"),
+        ("O1 if [0]\nO1 elseif [1] X5\nO1 endif", "part.nc:2: O1 elseif: X5: an expression in brackets"),
+        ("O1 if [0]\nO1 else X5\nO1 endif", "part.nc:2: O1 else: X5: an expression in brackets"),
+        ("G1 X1 F100\n%X50", "part.nc:2: % encloses the program and is alone on its line"),
         ("G43.4 H1", "part.nc:1: G43.4 requires a machine with kinematics; program G43"),
         ("G43.1 X1", "part.nc:1: G43.1: only Z is supported"),
         ("G5.3", "part.nc:1: G5.3 without G5.2"),
@@ -108,8 +114,9 @@ fn invalid_canned_cycles_are_rejected() {
         ("G81 X1 Z3 R2", "G81: the plane R is below the depth Z"),
         ("G82 X1 Z-1 R1", "G82 requires P, the dwell in s"),
         ("G83 X1 Z-1 R1", "G83 requires Q above 0, the depth of a peck"),
-        ("G83 X1 Z-1 R1 Q0.0001", "G83: more than 10000 pecks in one line, or L0"),
-        ("G81 X1 Z-1 R1 L0", "G81: more than 10000 pecks in one line, or L0"),
+        ("G83 X1 Z-1 R1 Q0.0001", "G83: 20000 pecks in one line; at most 10000 are allowed"),
+        ("G81 X1 Z-1 R1 L0", "G81: word L: 0 repetitions, must be 1 or more"),
+        ("G81 X1 Z-1 R1 L10001", "G81: 10001 repetitions in one line; at most 10000 are allowed"),
         ("G81 X1 Z-1 R1 A5", "word A: G81 moves X, Y and Z only"),
         ("G93 F1 G81 X1 Z-1 R1", "G81 requires G94 or G95"),
         ("G81 X1 Z-1 R1\nG82 X2 P1", "G82 requires R, the plane of retraction"),
@@ -212,9 +219,18 @@ fn endless_and_huge_programs_are_rejected() {
 }
 
 #[test]
+fn a_long_line_that_is_skipped_has_its_own_number() {
+    let long = format!("({})", "x".repeat(5000));
+    let expected = "the line is longer than 4096 bytes";
+    assert_eq!(error(&format!("G21\nO1 if [0]\nG1 X1\n{long}")), format!("part.nc:4: {expected}"));
+    assert_eq!(error(&format!("G21\nM98 P5\nM2\n{long}\nO5\nM99")), format!("part.nc:4: {expected}"));
+}
+
+#[test]
 fn ignored_m_codes_have_no_effect() {
     let options = InterpreterOptions { ignored_m_codes: vec![100, 6], ..InterpreterOptions::default() };
     assert_eq!(motions("G0 X1 M100\nM100 P5 Q2\nG0 X2", options.clone()).len(), 2);
+    assert_eq!(motions("G0 X1\nM100 X7\nM100 P1 G0 X2", options.clone()).len(), 2, "words of the code");
     assert_eq!(events("T1 M6", options.clone()).len(), 2, "selection and end, no change");
     let program = "G0 X1\nM6\nO1 repeat [3]\nM100 P5 M6\nO1 endrepeat\n";
     let mut interpreter = Interpreter::new(Cursor::new(program), "part.nc", options);

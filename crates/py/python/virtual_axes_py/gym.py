@@ -41,6 +41,8 @@ Motion = str | _native.Scenario | Array | Callable[[np.random.Generator], Array]
 
 LARGEST = 100.0
 """Bound of the observations, in their units."""
+ROUNDING = 1e-6
+"""Excess of an action beyond ±1 that counts as rounding."""
 
 
 class _Fleet:
@@ -77,10 +79,14 @@ class _Fleet:
         self._psec = np.zeros((machines, 0, len(names)))
         self._ends = np.zeros(machines, dtype=np.int64)
         self.cycle = np.zeros(machines, dtype=np.int64)
-        chosen = self._moving(self._plan(np.random.default_rng(0))) if axes is None else list(axes)
-        unknown = [name for name in chosen if name not in names]
-        if unknown or not chosen:
-            raise ValueError(f"axes {chosen}: must be some of {', '.join(names)}")
+        if axes is None:
+            chosen = self._moving(self._drawn(np.random.default_rng(0)))
+            if not chosen:
+                raise ValueError("motion: no axis moves; name the axes of action and observation (axes)")
+        else:
+            chosen = [axes] if isinstance(axes, str) else list(axes)
+        if not chosen or len(set(chosen)) < len(chosen) or any(name not in names for name in chosen):
+            raise ValueError(f"axes {chosen}: must be some of {', '.join(names)}, each once")
         self._columns = np.array([names.index(name) for name in chosen])
         default = 1e-5 if action == "psec" else 0.1
         size = np.asarray(default if residual is None else residual, dtype=np.float64)
@@ -108,8 +114,18 @@ class _Fleet:
         if callable(motion):
             return motion
         given = _native.Scenario.load(motion) if isinstance(motion, str) else motion
-        rows = given.psec(self.machine) if isinstance(given, _native.Scenario) else np.asarray(given, np.float64)
+        rows = given.psec(self.machine) if isinstance(given, _native.Scenario) else given
         return lambda random: rows
+
+    def _drawn(self, random: np.random.Generator) -> Array:
+        """Returns a motion drawn by a generator; raises `ValueError` if it is no finite array (setpoints, axes)."""
+        drawn = self._plan(random)
+        if drawn is None or np.ndim(drawn) != 2:
+            raise ValueError(f"motion {drawn!r}: must be an array (setpoints, axes)")
+        psec = np.ascontiguousarray(drawn, np.float64)
+        if psec.shape[1] != self._shape[1] or not len(psec) or not np.isfinite(psec).all():
+            raise ValueError(f"motion of the shape {psec.shape}: must be finite, (setpoints, {self._shape[1]})")
+        return psec
 
     def _moving(self, psec: Array) -> list[str]:
         """Returns the axes that move."""
@@ -117,10 +133,7 @@ class _Fleet:
 
     def reset(self, random: Sequence[np.random.Generator], only: NDArray[np.int64]) -> None:
         """Puts the machines `only` at the start of a motion, drawn by the generator of each."""
-        motions = [np.ascontiguousarray(self._plan(random[index]), np.float64) for index in only]
-        for psec in motions:
-            if psec.ndim != 2 or psec.shape[1] != self._shape[1] or not len(psec) or not np.isfinite(psec).all():
-                raise ValueError(f"motion of the shape {psec.shape}: must be finite, (setpoints, {self._shape[1]})")
+        motions = [self._drawn(random[index]) for index in only]
         # After the last setpoint the setpoints hold.
         rows = max(len(psec) for psec in motions) + self._settling + self._ahead + 1
         if rows > self._psec.shape[1]:
@@ -141,6 +154,11 @@ class _Fleet:
         shape = (self._shape[0], len(self._columns))
         if np.shape(actions) != shape:
             raise gymnasium.error.InvalidAction(f"the action has the shape {np.shape(actions)}; it needs {shape}")
+        if not np.all(np.abs(actions) <= 1 + ROUNDING):
+            worst = float(np.asarray(actions).flat[int(np.argmax(np.abs(actions)))])
+            raise gymnasium.error.InvalidAction(
+                f"the action has the value {worst:g}; it must be within ±1 (gymnasium.wrappers.ClipAction clips it)"
+            )
         psec = self._psec[self._rows[:, 0], self.cycle]
         offsets = np.zeros(self._shape)
         offsets[:, self._columns] = self._residual * actions
@@ -272,6 +290,8 @@ class ContouringVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[An
         if isinstance(seed, int | np.integer):
             super().reset(seed=int(seed))
             seed = [int(seed) + index for index in range(self.num_envs)]
+        if seed is not None and len(seed) != self.num_envs:
+            raise ValueError(f"seed: {len(seed)} seeds for {self.num_envs} machines; one for each is required")
         for index, one in enumerate(seed if seed is not None else ()):
             if one is not None:
                 self._random[index] = seeding.np_random(one)[0]
@@ -284,6 +304,8 @@ class ContouringVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[An
     ) -> tuple[Observation, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Advances all machines by one position cycle."""
         before = self._ended
+        if np.ndim(actions) == 2:
+            actions = np.where(before[: len(actions), None], 0, actions)
         error, ended = self._fleet.step(actions)
         if before.any():
             self._fleet.reset(self._random, np.flatnonzero(before))

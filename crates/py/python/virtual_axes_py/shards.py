@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 STUDY = "study.json"
 """Name of the file with the identity of the study."""
 CHUNK = re.compile(r"rows-(\d{9})-(\d{9})\.parquet")
+REMOVE = "remove the file, and complete the study with resume=True"
+"""What to do with a damaged file."""
 COMPARED = ("machine", "motion", "variants", "rows", "figures", "version")
 
 
@@ -189,7 +191,7 @@ def _table(file: Path, first: int, end: int) -> pyarrow.Table:
     try:
         table = parquet.read_table(file)
     except pa.ArrowException as error:
-        raise ValueError(f"{file} is damaged: {error}") from error
+        raise ValueError(f"{file} is damaged: {error}; {REMOVE}") from error
     if "row" not in table.column_names or table["row"].to_pylist() != list(range(first, end)):
-        raise ValueError(f"{file} is damaged: its rows are not {first} to {end - 1}")
+        raise ValueError(f"{file} is damaged: its rows are not {first} to {end - 1}; {REMOVE}")
     return table
