@@ -86,11 +86,11 @@ def test_a_program_runs_to_its_end_with_feedback_and_figures(programs: Follow) -
     moving = np.flatnonzero(np.diff(np.column_stack([x, y]), axis=0).any(axis=1))
     duration = (moving[-1] - moving[0] + 1) * TSP
     assert result.cycle_time == pytest.approx(duration, abs=2.5 * TSP)
-    assert len(result.name) == len(result.max_tracking_error) == 5
+    assert len(result.name) == len(result.max_synchronized_tracking_error) == 5
     error = states["synchronized_tracking_error"]
-    assert max(result.max_tracking_error) == pytest.approx(np.abs(error).max(), rel=1e-12)
+    assert max(result.max_synchronized_tracking_error) == pytest.approx(np.abs(error).max(), rel=1e-12)
     assert 0 < result.rms_contour_error < result.max_contour_error < 1e-3
-    assert list(result.worst_tracking_error) == sorted(result.worst_tracking_error, reverse=True)
+    assert list(result.worst_synchronized_tracking_error) == sorted(result.worst_synchronized_tracking_error, reverse=True)
     assert set(result.worst_line) == {2, 3, 4, 5, 6}
     # Feedback and result are independent streams: the last feedback may arrive after the result.
     programs.drive.wait_for(lambda: any(f.line == 6 for f in sent.feedback), 20, "feedback of the last line")

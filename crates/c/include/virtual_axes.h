@@ -362,7 +362,7 @@ enum VaStatus va_step_for_ns(struct VaMachine *machine,
                              size_t count);
 
 /**
- * Sets the external loads, N or N·m, one per axis, positive towards plus; they act from the next step on.
+ * Sets the external loads, N or N·m within ±10⁶, one per axis, positive towards plus; they act from the next step on.
  *
  * # Safety
  * `machine` is null or a machine of this library, `loads` null or a pointer to `count` numbers.

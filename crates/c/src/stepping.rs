@@ -70,7 +70,7 @@ pub unsafe extern "C" fn va_step_for_ns(
     })
 }
 
-/// Sets the external loads, N or N·m, one per axis, positive towards plus; they act from the next step on.
+/// Sets the external loads, N or N·m within ±10⁶, one per axis, positive towards plus; they act from the next step on.
 ///
 /// # Safety
 /// `machine` is null or a machine of this library, `loads` null or a pointer to `count` numbers.

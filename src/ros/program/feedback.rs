@@ -48,7 +48,7 @@ impl ProgramFeedbackOutput {
             feed_override: frame.feed_rate,
             contour_error: program.contour_error,
             name: self.joints.clone(),
-            tracking_error: errors.collect(),
+            synchronized_tracking_error: errors.collect(),
         };
         self.output.send(FeedbackMessage { goal_id: UUID { uuid: goal.id }, feedback }).await;
     }

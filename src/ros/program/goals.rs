@@ -182,10 +182,16 @@ impl ProgramGoals {
             max_contour_error: end.report.max_contour_error.unwrap_or(f64::NAN),
             rms_contour_error: end.report.rms_contour_error.unwrap_or(f64::NAN),
             name: end.axis_indices.iter().map(name).collect(),
-            max_tracking_error: axes.iter().map(|a| a.max_delay_compensated_following_error).collect(),
-            rms_tracking_error: axes.iter().map(|a| a.rms_delay_compensated_following_error).collect(),
+            max_synchronized_tracking_error: axes
+                .iter()
+                .map(|a| a.max_delay_compensated_following_error)
+                .collect(),
+            rms_synchronized_tracking_error: axes
+                .iter()
+                .map(|a| a.rms_delay_compensated_following_error)
+                .collect(),
             worst_line: figures.worst_lines.iter().map(|(line, _)| *line as u32).collect(),
-            worst_tracking_error: figures.worst_lines.iter().map(|(_, error)| *error).collect(),
+            worst_synchronized_tracking_error: figures.worst_lines.iter().map(|(_, error)| *error).collect(),
         };
         (state, result)
     }

@@ -13,7 +13,8 @@ pub struct RunProgramGoal {
     pub feed_override: f64,
 }
 
-/// Result of the action `RunProgram`; units in `msg/action/RunProgram.action`. `tracking_error` is the following error.
+/// Result of the action `RunProgram`; units in `msg/action/RunProgram.action`. `synchronized_tracking_error` is the
+/// delay-compensated following error.
 #[allow(missing_docs, reason = "documented in msg/action/RunProgram.action")]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunProgramResult {
@@ -24,13 +25,14 @@ pub struct RunProgramResult {
     pub max_contour_error: f64,
     pub rms_contour_error: f64,
     pub name: Vec<String>,
-    pub max_tracking_error: Vec<f64>,
-    pub rms_tracking_error: Vec<f64>,
+    pub max_synchronized_tracking_error: Vec<f64>,
+    pub rms_synchronized_tracking_error: Vec<f64>,
     pub worst_line: Vec<u32>,
-    pub worst_tracking_error: Vec<f64>,
+    pub worst_synchronized_tracking_error: Vec<f64>,
 }
 
-/// Feedback of the action `RunProgram`; units in `msg/action/RunProgram.action`. `tracking_error` is the following error.
+/// Feedback of the action `RunProgram`; units in `msg/action/RunProgram.action`. `synchronized_tracking_error` is the
+/// delay-compensated following error.
 #[allow(missing_docs, reason = "documented in msg/action/RunProgram.action")]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunProgramFeedback {
@@ -42,7 +44,7 @@ pub struct RunProgramFeedback {
     pub feed_override: f64,
     pub contour_error: f64,
     pub name: Vec<String>,
-    pub tracking_error: Vec<f64>,
+    pub synchronized_tracking_error: Vec<f64>,
 }
 
 /// Values of `error_code` in the result of the action `RunProgram`.
