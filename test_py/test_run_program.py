@@ -90,7 +90,9 @@ def test_a_program_runs_to_its_end_with_feedback_and_figures(programs: Follow) -
     error = states["synchronized_tracking_error"]
     assert max(result.max_synchronized_tracking_error) == pytest.approx(np.abs(error).max(), rel=1e-12)
     assert 0 < result.rms_contour_error < result.max_contour_error < 1e-3
-    assert list(result.worst_synchronized_tracking_error) == sorted(result.worst_synchronized_tracking_error, reverse=True)
+    assert list(result.worst_synchronized_tracking_error) == sorted(
+        result.worst_synchronized_tracking_error, reverse=True
+    )
     assert set(result.worst_line) == {2, 3, 4, 5, 6}
     # Feedback and result are independent streams: the last feedback may arrive after the result.
     programs.drive.wait_for(lambda: any(f.line == 6 for f in sent.feedback), 20, "feedback of the last line")
@@ -253,7 +255,10 @@ def test_the_stop_service_and_a_newer_program_end_a_program(programs: Follow) ->
     first = programs.send(Goal(program=LONG))
     first.wait_for_feedback(5)
     second = programs.send(Goal(program=LONG))
-    assert first.result(30).error_code == Result.PREEMPTED
+    preempted = first.result(30)
+    assert preempted.error_code == Result.PREEMPTED
+    # Its figures are those until its end.
+    assert preempted.cycle_time > 0 and list(preempted.worst_line)
     second.wait_for_feedback(5)
     programs.drive.stop()
     assert second.result(30).error_code == Result.STOPPED
