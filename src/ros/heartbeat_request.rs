@@ -10,7 +10,7 @@
 //! 3 s. So the first message of a publisher that is older than the node would wait for 3 s, and that of a publisher
 //! that sends one message and exits, such as `ros2 topic pub --once`, would be lost.
 //!
-//! [`HeartbeatRequest`] sends two datagrams as soon as a publisher is matched:
+//! [`HeartbeatRequests`] sends two datagrams as soon as a publisher is matched:
 //!
 //! ```text
 //! to the own reader: RTPS header (20), INFO_DST (4 + 12), INFO_REPLY (4 + 32): socket of the request |
@@ -30,11 +30,15 @@
 //! The same holds for the publishers of Fast DDS that announce its endpoints. Those of a participant that is older than
 //! the node would be known after their heartbeat period of 1 s. So their HEARTBEATs are requested if no endpoint is
 //! known 0.15 s after the participant. An earlier request would reach participants that do not know the node yet.
+//!
+//! A publisher that learns of the node after the request discards it, and its first HEARTBEAT, of count 1, seems a
+//! repetition of the empty one. Therefore requests to publishers are repeated for a second; one that has accepted an ACKNACK
+//! ignores them.
 
-use std::{
-    io,
-    net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket},
-};
+use std::collections::VecDeque;
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
+use std::time::{Duration, Instant};
 
 use rustdds::{DomainParticipant, GUID, RTPSEntity};
 use tracing::debug;
@@ -52,24 +56,39 @@ const READER_KIND: u8 = 0xc7;
 /// Mask of an entity kind that is zero for endpoints of the application.
 const BUILT_IN: u8 = 0xf0;
 
+/// Time between two requests, and from the discovery of a participant to the first one.
+const PERIOD: Duration = Duration::from_millis(150);
+/// Number of repetitions of a request.
+const REPETITIONS: u32 = 6;
 /// Count of the messages: the first one that Fast DDS and RustDDS do not take for a duplicate.
 const COUNT: u32 = 1;
 
-/// Socket that requests a HEARTBEAT from each newly matched publisher.
-pub(super) struct HeartbeatRequest {
+/// Request that may be repeated.
+#[derive(Debug, Clone, Copy)]
+enum Request {
+    /// To a publisher of a reader of this node.
+    Publisher { reader: GUID, writer: GUID },
+    /// To a participant without known endpoints.
+    Participant(GUID),
+}
+
+/// Requests of HEARTBEATs from new publishers and participants.
+pub(super) struct HeartbeatRequests {
     socket: UdpSocket,
     /// Address of the socket, which reads nothing.
     address: SocketAddrV4,
+    /// Requests to be sent, by their times, each with the number of those sent before.
+    queue: VecDeque<(Instant, Request, u32)>,
 }
 
-impl HeartbeatRequest {
+impl HeartbeatRequests {
     /// Opens the socket. Returns `None` and logs the reason if the system provides none.
     pub(super) fn open() -> Option<Self> {
         let open = || {
             let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
             socket.set_nonblocking(true)?;
             let address = SocketAddrV4::new(Ipv4Addr::LOCALHOST, socket.local_addr()?.port());
-            Ok::<_, io::Error>(HeartbeatRequest { socket, address })
+            Ok::<_, io::Error>(HeartbeatRequests { socket, address, queue: VecDeque::new() })
         };
         open()
             .inspect_err(|error| debug!("no HEARTBEAT is requested from publishers: no UDP socket: {error}"))
@@ -77,40 +96,79 @@ impl HeartbeatRequest {
     }
 
     /// Requests a HEARTBEAT and the first sample of a publisher that has just been matched with a reader of `participant`.
-    pub(super) fn send(&self, participant: &DomainParticipant, reader: GUID, writer: GUID) {
-        let (own, other) = (reader.to_bytes(), writer.to_bytes());
-        if is_secured() || !needs_request(&own, &other) {
-            return;
+    pub(super) fn add_publisher(&mut self, participant: &DomainParticipant, reader: GUID, writer: GUID) {
+        if !is_secured() && needs_request(&reader.to_bytes(), &writer.to_bytes()) {
+            self.send(participant, DiscoveryRange::Off, Request::Publisher { reader, writer }, 0);
         }
-        let Some(port) = user_port(participant.domain_id(), participant.participant_id()) else { return };
-        self.send_empty_heartbeat(&own, &other, port);
+    }
+
+    /// Records a participant that has just been discovered.
+    pub(super) fn add_participant(&mut self, other: GUID) {
+        if !is_secured() && other.to_bytes()[..2] == VENDOR_FAST_DDS {
+            self.queue.push_back((Instant::now() + PERIOD, Request::Participant(other), 0));
+        }
+    }
+
+    /// Sends the requests of `participant`, which is announced in `range`, when they are due. Does not end. Cancel-safe.
+    pub(super) async fn run(&mut self, participant: &DomainParticipant, range: DiscoveryRange) {
+        while let Some(&(due, _, _)) = self.queue.front() {
+            tokio::time::sleep_until(due.into()).await;
+            if let Some((_, request, sent)) = self.queue.pop_front() {
+                self.send(participant, range, request, sent);
+            }
+        }
+        std::future::pending().await
+    }
+
+    /// Sends a request for the `sent`-th time after the first, and queues the next one.
+    fn send(&mut self, participant: &DomainParticipant, range: DiscoveryRange, request: Request, sent: u32) {
+        match request {
+            Request::Publisher { reader, writer } => {
+                self.request_of_publisher(participant, reader, writer, sent == 0);
+            }
+            Request::Participant(other) if has_endpoints(participant, &other.to_bytes()) => return,
+            Request::Participant(other) => self.request_of_participant(participant, other, range, sent == 0),
+        }
+        if sent < REPETITIONS {
+            self.queue.push_back((Instant::now() + PERIOD, request, sent + 1));
+        }
+    }
+
+    fn request_of_publisher(
+        &self,
+        participant: &DomainParticipant,
+        reader: GUID,
+        writer: GUID,
+        is_first: bool,
+    ) {
+        let (own, other) = (reader.to_bytes(), writer.to_bytes());
+        if let Some(port) = user_port(participant.domain_id(), participant.participant_id())
+            && is_first
+        {
+            self.send_empty_heartbeat(&own, &other, port);
+        }
         let request = request(&own, &other);
         for to in addresses(participant, writer) {
             // The publisher may have exited already.
             let _ = self.socket.send_to(&request, to);
         }
     }
-}
 
-impl HeartbeatRequest {
-    /// Requests HEARTBEATs of the announcements of a participant, `other`, that `participant` has discovered without any
-    /// of its endpoints.
-    pub(super) fn send_to_participant(
+    fn request_of_participant(
         &self,
         participant: &DomainParticipant,
         other: GUID,
         range: DiscoveryRange,
+        is_first: bool,
     ) {
         let (own, other) = (participant.guid().to_bytes(), other.to_bytes());
-        if is_secured() || other[..2] != VENDOR_FAST_DDS || has_endpoints(participant, &other) {
-            return;
-        }
-        let Some(port) = discovery_port(participant.domain_id(), participant.participant_id()) else {
-            return;
-        };
-        for writer in ANNOUNCEMENT_WRITERS {
-            let [own, other] = [(own, reader_of(writer)), (other, writer)].map(endpoint);
-            self.send_empty_heartbeat(&own, &other, port);
+        if let Some(port) = discovery_port(participant.domain_id(), participant.participant_id())
+            && is_first
+        {
+            for writer in ANNOUNCEMENT_WRITERS {
+                let [own, other] = [(own, reader_of(writer)), (other, writer)].map(endpoint);
+                self.send_empty_heartbeat(&own, &other, port);
+            }
         }
         DiscoveryMessage::new(announcement_request(&own, &other), participant, range).send_once();
     }

@@ -1,6 +1,6 @@
 //! Matched subscriptions of each topic: messages without subscribers are not built.
 
-use std::collections::{HashSet, VecDeque};
+use std::collections::HashSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -12,7 +12,7 @@ use tokio::sync::watch;
 use tracing::debug;
 
 use super::announcement_eviction::AnnouncementEviction;
-use super::heartbeat_request::HeartbeatRequest;
+use super::heartbeat_request::HeartbeatRequests;
 use super::own_participants::OwnParticipants;
 use super::remote_endpoints::{EndpointCounter, RemoteEndpoints};
 use super::remote_participants::RemoteParticipants;
@@ -79,9 +79,6 @@ impl MatchedSubscriptionTracker {
     }
 }
 
-/// Time from the discovery of a participant until its endpoints are discovered, if no HEARTBEAT was missed.
-const ANNOUNCEMENT_TIME: Duration = Duration::from_millis(150);
-
 /// Handling of the status events of a participant: updates the matched subscriptions, requests a HEARTBEAT of
 /// matched writers, counts discovered endpoints, and records the participants.
 ///
@@ -106,8 +103,7 @@ impl DiscoveryEvents {
     pub(super) async fn run(self) {
         let DiscoveryEvents { participant, tracker, own, counter, participants, is_current } = self;
         let is_current = || is_current.load(Ordering::Relaxed);
-        let heartbeat = HeartbeatRequest::open();
-        let mut unannounced = VecDeque::new();
+        let mut heartbeats = HeartbeatRequests::open();
         let mut eviction = AnnouncementEviction::default();
         let mut remote = RemoteEndpoints::new(|guid: &Guid| own.contains(guid), counter);
         let status = participant.status_listener();
@@ -123,13 +119,15 @@ impl DiscoveryEvents {
                         }
                     }
                     Some(DomainParticipantStatusEvent::RemoteWriterMatched { local_reader, remote_writer }) => {
-                        if let Some(request) = heartbeat.as_ref().filter(|_| is_current()) {
-                            request.send(&participant, local_reader, remote_writer);
+                        if let Some(requests) = heartbeats.as_mut().filter(|_| is_current()) {
+                            requests.add_publisher(&participant, local_reader, remote_writer);
                         }
                     }
                     Some(event) => {
-                        if let DomainParticipantStatusEvent::ParticipantDiscovered { dpd } = &event {
-                            unannounced.push_back((Instant::now() + ANNOUNCEMENT_TIME, dpd.guid));
+                        if let (Some(requests), DomainParticipantStatusEvent::ParticipantDiscovered { dpd }) =
+                            (&mut heartbeats, &event)
+                        {
+                            requests.add_participant(dpd.guid);
                         }
                         remote.update(&event);
                         participants.update(&event, Instant::now());
@@ -141,23 +139,18 @@ impl DiscoveryEvents {
                     }
                     None => return,
                 },
-                other = first_due(&mut unannounced) => if let Some(request) = &heartbeat {
-                    request.send_to_participant(&participant, other, own.range());
-                },
+                () = async {
+                    match &mut heartbeats {
+                        Some(requests) => requests.run(&participant, own.range()).await,
+                        None => std::future::pending().await,
+                    }
+                } => {}
                 _ = timer.tick() => if is_current() {
                     tracker.borrow().poll(&participant);
                 },
             }
         }
     }
-}
-
-/// Waits until the first participant of a queue is due, and removes it. Waits forever if there is none.
-async fn first_due(queue: &mut VecDeque<(Instant, GUID)>) -> GUID {
-    let Some(&(due, participant)) = queue.front() else { return std::future::pending().await };
-    tokio::time::sleep_until(due.into()).await;
-    queue.pop_front();
-    participant
 }
 
 /// Returns true if the lease of a participant has expired.
