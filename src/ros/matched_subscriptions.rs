@@ -125,7 +125,7 @@ impl DiscoveryEvents {
                     }
                     Some(event) => {
                         if let (Some(requests), DomainParticipantStatusEvent::ParticipantDiscovered { dpd }) =
-                            (&mut heartbeats, &event)
+                            (heartbeats.as_mut().filter(|_| is_current()), &event)
                         {
                             requests.add_participant(dpd.guid);
                         }
