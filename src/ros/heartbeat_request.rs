@@ -205,8 +205,7 @@ fn announcement_request(own: &Guid, other: &Guid) -> Vec<u8> {
 
 /// Returns true for an application writer of Fast DDS and an application reader.
 ///
-/// Other middleware answers the ACKNACK of RustDDS. Built-in writers are requested
-/// by participant.
+/// Other middleware answers the ACKNACK of RustDDS. Built-in writers are requested by participant.
 fn needs_request(reader: &Guid, writer: &Guid) -> bool {
     writer[..2] == VENDOR_FAST_DDS && (reader[15] | writer[15]) & BUILT_IN == 0
 }
