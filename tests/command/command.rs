@@ -414,7 +414,7 @@ fn memory_is_independent_of_the_number_of_setpoints() {
 fn an_interrupted_command_leaves_no_file() {
     for signal in ["INT", "TERM"] {
         let folder = TestFolder::new(&format!("interrupted_{signal}"));
-        let psec = folder.text_file("psec.csv", "time,x\n0,0\n1000000,0.3\n");
+        let psec = folder.text_file("psec.csv", "time,x\n0,0\n350000,0.3\n");
         let mut child = Command::new(env!("CARGO_BIN_EXE_virtual_axes"))
             .args(["run", &psec, "--trace", &folder.path("trace.csv")])
             .stdout(Stdio::null())
@@ -424,6 +424,7 @@ fn an_interrupted_command_leaves_no_file() {
         let until = Instant::now() + Duration::from_secs(60);
         while folder.names().len() < 2 {
             assert!(Instant::now() < until, "no trace was started");
+            assert_eq!(child.try_wait().expect("it is a child"), None, "it ended before a trace was started");
             std::thread::sleep(Duration::from_millis(10));
         }
         let id = child.id().to_string();
