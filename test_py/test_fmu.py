@@ -199,6 +199,8 @@ def test_rejected_values_are_named_in_the_log(instance: Callable[[], Instance]) 
     with pytest.raises(FMICallException):
         one.set("x.setpoint", float("inf"))
     with pytest.raises(FMICallException):
+        one.set("y.setpoint", 1e308)
+    with pytest.raises(FMICallException):
         one.set("x.position", 1.0)
     with pytest.raises(FMICallException):
         one.slave.setReal([100_000], [1.0])
@@ -211,7 +213,8 @@ def test_rejected_values_are_named_in_the_log(instance: Callable[[], Instance]) 
         one.set("x.motor.inertia_kg_m2", 0.05)
     words = [
         "x.position_loop.gain",
-        "x.setpoint is inf; it must be finite",
+        "x.setpoint is inf; it must lie in ±1000000",
+        "y.setpoint is 1e308; it must lie in ±1000000",
         "x.position is an output",
         "value reference is 100000; it must be below",
         "x.setpoint is of type Real",

@@ -1,6 +1,6 @@
 //! Axis loads from `JointState` messages: effort as external force or torque.
 
-use virtual_axes_core::simulation::check_load;
+use virtual_axes_core::machine::check_input;
 use virtual_axes_core::text::shortened;
 use virtual_axes_io::messages::sensor_msgs::msg::JointState;
 
@@ -32,7 +32,7 @@ pub fn loads(message: &JointState, joints: &[String]) -> Result<Vec<(usize, f64)
             if message.name.iter().filter(|n| *n == name).count() > 1 {
                 return Err(format!("joint {name} is given twice"));
             }
-            check_load(load).map_err(|error| format!("joint {name}: effort is {error}"))?;
+            check_input(load).map_err(|error| format!("joint {name}: effort is {error}"))?;
             Ok((index, load))
         })
         .collect()

@@ -4,6 +4,8 @@ use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use virtual_axes_core::machine::check_input;
+
 /// Result of a function.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,14 +115,14 @@ pub(crate) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Result<&'a 
         .map_err(|_| BorderError::invalid(format!("{name}: {:?} is not UTF-8", text.to_string_lossy())))
 }
 
-/// Returns the `count` numbers behind a pointer, which must be `wanted`.
+/// Returns the `count` inputs of axes behind a pointer, which must be `wanted`.
 ///
 /// # Errors
-/// A null pointer, another number, or a number that is not finite.
+/// A null pointer, another number, or an input out of range.
 ///
 /// # Safety
 /// `pointer` is null, or points to `count` numbers that nothing changes as long as the slice is used.
-pub(crate) unsafe fn numbers<'a>(
+pub(crate) unsafe fn inputs<'a>(
     pointer: *const f64,
     count: usize,
     wanted: usize,
@@ -132,12 +134,10 @@ pub(crate) unsafe fn numbers<'a>(
     }
     // SAFETY: it is not null, and the caller promises this number of values.
     let values = unsafe { std::slice::from_raw_parts(pointer, count) };
-    match values.iter().position(|value| !value.is_finite()) {
-        Some(index) => {
-            Err(BorderError::invalid(format!("{name}[{index}] is {}; it must be finite", values[index])))
-        }
-        None => Ok(values),
+    for (index, &value) in values.iter().enumerate() {
+        check_input(value).map_err(|error| BorderError::invalid(format!("{name}[{index}] is {error}")))?;
     }
+    Ok(values)
 }
 
 /// Returns the space for `wanted` numbers behind a pointer.

@@ -16,7 +16,7 @@
 //!
 //! - Every function that can fail returns a [`VaStatus`]; [`va_last_error`] has the reason as text. Nothing is changed
 //!   then.
-//! - Null pointers and wrong lengths are errors. No panic crosses the border: [`VaStatus::VaPanic`].
+//! - Null pointers, wrong lengths, and setpoints, positions or loads beyond ±10⁶ are errors. No panic crosses the border: [`VaStatus::VaPanic`].
 //! - A machine may be used by any thread, but by one at a time. Different machines are independent. The text of the last
 //!   error belongs to the calling thread.
 //! - Axis quantities are in m or rad, motor quantities in rad/s and N·m, forces in N or N·m; arrays are in the order of the

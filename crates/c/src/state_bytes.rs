@@ -1,7 +1,7 @@
 //! Saved states as bytes.
 
 use virtual_axes_core::config::Parameters;
-use virtual_axes_core::machine::Machine;
+use virtual_axes_core::machine::{Machine, check_input};
 use virtual_axes_core::state_codec::checksum;
 
 use crate::border::{BorderError, VaStatus, guard, reference, reference_mut};
@@ -52,7 +52,7 @@ impl VaState {
         {
             return Err(BorderError::invalid("the state is that of a machine with other axes or periods"));
         }
-        if !preview.iter().all(|setpoint| setpoint.is_finite()) {
+        if preview.iter().any(|&setpoint| check_input(setpoint).is_err()) {
             return Err(damaged());
         }
         Ok(VaState {

@@ -1,8 +1,6 @@
 //! Steps: position cycles, parts of them, loads, preview.
 
-use virtual_axes_core::simulation::check_load;
-
-use crate::border::{BorderError, VaStatus, guard, numbers, reference_mut};
+use crate::border::{BorderError, VaStatus, guard, inputs, reference_mut};
 use crate::machine::VaMachine;
 
 /// Longest step, ns: 1000 s.
@@ -34,7 +32,7 @@ pub unsafe extern "C" fn va_step(machine: *mut VaMachine, psec: *const f64, coun
         // SAFETY: the caller promises a machine.
         let machine = unsafe { reference_mut(machine, "machine") }?;
         // SAFETY: the caller promises this number of values.
-        let psec = unsafe { numbers(psec, count, machine.axis_count(), "psec") }?;
+        let psec = unsafe { inputs(psec, count, machine.axis_count(), "psec") }?;
         machine.advance(machine.machine.ticks_per_period(), psec)
     })
 }
@@ -57,7 +55,7 @@ pub unsafe extern "C" fn va_step_for_ns(
         // SAFETY: the caller promises a machine.
         let machine = unsafe { reference_mut(machine, "machine") }?;
         // SAFETY: the caller promises this number of values.
-        let psec = unsafe { numbers(psec, count, machine.axis_count(), "psec") }?;
+        let psec = unsafe { inputs(psec, count, machine.axis_count(), "psec") }?;
         let period = machine.machine.periods().current.unsigned_abs();
         if duration_ns == 0 || !duration_ns.is_multiple_of(period) || duration_ns > LONGEST_STEP_NS {
             let reason = format!(
@@ -80,10 +78,7 @@ pub unsafe extern "C" fn va_set_loads(machine: *mut VaMachine, loads: *const f64
         // SAFETY: the caller promises a machine.
         let machine = unsafe { reference_mut(machine, "machine") }?;
         // SAFETY: the caller promises this number of values.
-        let loads = unsafe { numbers(loads, count, machine.axis_count(), "loads") }?;
-        for (index, &load) in loads.iter().enumerate() {
-            check_load(load).map_err(|error| BorderError::invalid(format!("loads[{index}] is {error}")))?;
-        }
+        let loads = unsafe { inputs(loads, count, machine.axis_count(), "loads") }?;
         loads.iter().enumerate().for_each(|(axis, &load)| machine.machine.set_load(axis, load));
         Ok(())
     })
@@ -126,7 +121,7 @@ pub unsafe extern "C" fn va_set_preview(
                 ))
             })?;
             // SAFETY: the caller promises this number of values.
-            machine.preview.extend_from_slice(unsafe { numbers(preview, count, count, "preview") }?);
+            machine.preview.extend_from_slice(unsafe { inputs(preview, count, count, "preview") }?);
         }
         Ok(())
     })
@@ -148,7 +143,7 @@ pub unsafe extern "C" fn va_reset(machine: *mut VaMachine, positions: *const f64
             vec![0.0; axes]
         } else {
             // SAFETY: the caller promises this number of values.
-            unsafe { numbers(positions, count, axes, "positions") }?.to_vec()
+            unsafe { inputs(positions, count, axes, "positions") }?.to_vec()
         };
         machine.machine.reset(&positions);
         machine.preview.clear();

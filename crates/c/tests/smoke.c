@@ -53,6 +53,10 @@ static void bad_calls(VaMachine *machine) {
   check_error(va_step_for_ns(machine, 1, values, AXES), VA_INVALID, "125000");
   check_error(va_step_for_ns(machine, 0, values, AXES), VA_INVALID, "duration_ns");
   check_error(va_step_for_ns(machine, UINT64_MAX - UINT64_MAX % 125000, values, AXES), VA_INVALID, "up to");
+  values[2] = 1e308;
+  check_error(va_step(machine, values, AXES), VA_INVALID, "psec[2] is 1e308; it must lie in");
+  check_error(va_reset(machine, values, AXES), VA_INVALID, "positions[2]");
+  check_error(va_set_preview(machine, values, 1), VA_INVALID, "preview[2]");
   values[2] = NAN;
   check_error(va_step(machine, values, AXES), VA_INVALID, "psec[2]");
   check_error(va_set_loads(machine, values, AXES), VA_INVALID, "loads[2]");

@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use virtual_axes_core::config::{Assignment, Parameters, Value, ValueSource, parse_assignment};
-use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters};
-use virtual_axes_core::simulation::check_load;
+use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters, check_input};
 
 use crate::signals::SignalReader;
 use crate::variables::{Causality, FmuType, FmuVariable, FmuVariables, VariableRole, text_value};
@@ -176,11 +175,9 @@ impl Slave {
             _ => {}
         }
         match setting {
-            VariableSetting::Real(value) if !value.is_finite() => {
-                Err(format!("{name} is {value}; it must be finite"))
-            }
-            VariableSetting::Real(value) if matches!(variable.role, VariableRole::Load(_)) => {
-                check_load(value).map_err(|error| format!("{name} is {error}"))
+            // The schema limits parameters.
+            VariableSetting::Real(value) if !matches!(variable.role, VariableRole::Parameter(_)) => {
+                check_input(value).map_err(|error| format!("{name} is {error}"))
             }
             _ => Ok(()),
         }

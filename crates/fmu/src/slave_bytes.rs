@@ -1,7 +1,7 @@
 //! States as bytes, for `fmi2SerializeFMUstate`.
 
 use virtual_axes_core::config::Parameters;
-use virtual_axes_core::machine::Machine;
+use virtual_axes_core::machine::{Machine, check_input};
 use virtual_axes_core::state_codec::checksum;
 
 use crate::slave::{Phase, Slave, discretized};
@@ -49,7 +49,7 @@ impl Slave {
         slave.start_time = reader.number().ok_or_else(damaged)?;
         for values in [&mut slave.psec, &mut slave.loads, &mut slave.start_positions, &mut slave.preview] {
             for value in values {
-                *value = reader.number().ok_or_else(damaged)?;
+                *value = reader.number().filter(|&value| check_input(value).is_ok()).ok_or_else(damaged)?;
             }
         }
         let length = u64::from_le_bytes(reader.array().ok_or_else(damaged)?);

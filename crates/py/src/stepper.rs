@@ -7,8 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use virtual_axes_core::config::Parameters;
-use virtual_axes_core::machine::{AxisSample, Machine as CoreMachine, MachineParameters};
-use virtual_axes_core::simulation::check_load;
+use virtual_axes_core::machine::{AxisSample, Machine as CoreMachine, MachineParameters, check_input};
 use virtual_axes_core::units::seconds;
 
 use crate::convert::value_error;
@@ -83,12 +82,10 @@ impl Stepper {
             return Err(PyValueError::new_err(format!("{name} has the shape {shape:?}; it needs {needed}")));
         }
         let values: Vec<f64> = array.as_array().iter().copied().collect();
-        match values.iter().position(|value| !value.is_finite()) {
-            Some(index) => {
-                Err(value_error(format!("{name}: value {index} is {}; it must be finite", values[index])))
-            }
-            None => Ok(values),
+        for (index, &value) in values.iter().enumerate() {
+            check_input(value).map_err(|error| value_error(format!("{name}: value {index} is {error}")))?;
         }
+        Ok(values)
     }
 
     /// Returns an array (axes) of one machine, (machines, axes) of several.
@@ -156,8 +153,9 @@ impl Stepper {
                     };
                     return Err(value_error(format!("preview has the shape {shape:?}; it needs {needed}")));
                 }
-                if let Some(value) = values.iter().find(|value| !value.is_finite()) {
-                    return Err(value_error(format!("preview has the value {value}; it must be finite")));
+                for &value in &values {
+                    check_input(value)
+                        .map_err(|error| value_error(format!("preview has the value {error}")))?;
                 }
                 values.iter().copied().collect()
             }
@@ -196,9 +194,6 @@ impl Stepper {
 
     fn set_load(&mut self, load: PyReadonlyArrayDyn<'_, f64>) -> PyResult<()> {
         let loads = self.values("load", &load)?;
-        for &load in &loads {
-            check_load(load).map_err(|error| value_error(format!("load is {error}")))?;
-        }
         loads.into_iter().enumerate().for_each(|(axis, load)| self.machine.set_load(axis, load));
         Ok(())
     }

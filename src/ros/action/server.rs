@@ -330,7 +330,7 @@ impl<H: GoalHandler> Task<'_, H> {
     async fn cancel(&mut self, request: RmwRequestId, message: &CancelGoalRequest, permit: ResponsePermit) {
         let (response, motions) = self.goals.cancel(message);
         if !motions.is_empty() {
-            info!("canceling {} goals", motions.len());
+            info!("goals being canceled: {}", motions.len());
         }
         for motion in motions {
             // The end of the motion reports the outcome.

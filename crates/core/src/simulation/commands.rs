@@ -202,7 +202,7 @@ impl Simulation {
     }
 
     /// Sets the external force or torque on an axis, N or N·m, positive in positive direction, from the
-    /// next position cycle on for `hold` ns; limited to ±[`MAX_LOAD`](super::MAX_LOAD), zero for NaN.
+    /// next position cycle on for `hold` ns; limited to ±[`MAX_INPUT`](crate::machine::MAX_INPUT), zero for NaN.
     pub fn set_load(&mut self, axis: usize, load: f64, hold: Nanoseconds) {
         let until = self.next + hold.max(0).div_euclid(self.grid.period).max(1);
         self.loads.set(axis, load, until);

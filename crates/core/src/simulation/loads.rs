@@ -1,23 +1,6 @@
 //! External forces and torques on the axes, each with a hold time.
 
-use crate::machine::Machine;
-use crate::units::Rounded;
-
-/// Largest load, N or N·m; above all process forces, and small enough for a finite drive state.
-pub const MAX_LOAD: f64 = 1e6;
-
-/// Load that is no number or larger than [`MAX_LOAD`], N or N·m.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("{}; it must lie in ±{MAX_LOAD}", Rounded(*.0))]
-pub struct InvalidLoad(pub f64);
-
-/// Checks an external load of an axis, N or N·m.
-///
-/// # Errors
-/// [`InvalidLoad`] if it is NaN or beyond ±[`MAX_LOAD`].
-pub fn check_load(load: f64) -> Result<(), InvalidLoad> {
-    if load.abs() <= MAX_LOAD { Ok(()) } else { Err(InvalidLoad(load)) }
-}
+use crate::machine::{MAX_INPUT, Machine};
 
 #[derive(Debug, Clone, Copy, Default)]
 struct AxisLoad {
@@ -39,10 +22,10 @@ impl AxisLoads {
         AxisLoads { axes: vec![AxisLoad::default(); axes] }
     }
 
-    /// Sets the load of an axis up to instant `until`, limited to ±[`MAX_LOAD`]; NaN is zero.
+    /// Sets the load of an axis up to instant `until`, limited to ±[`MAX_INPUT`]; NaN is zero.
     pub(super) fn set(&mut self, axis: usize, value: f64, until: i64) {
         if let Some(load) = self.axes.get_mut(axis) {
-            let value = if value.is_nan() { 0.0 } else { value.clamp(-MAX_LOAD, MAX_LOAD) };
+            let value = if value.is_nan() { 0.0 } else { value.clamp(-MAX_INPUT, MAX_INPUT) };
             *load = AxisLoad { value, until };
         }
     }

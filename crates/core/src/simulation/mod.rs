@@ -9,7 +9,6 @@ mod loads;
 mod motions;
 mod tolerance;
 
-pub use loads::{InvalidLoad, MAX_LOAD, check_load};
 pub use motions::{AbortReason, MotionEnd, MotionOutcome};
 pub use tolerance::{Quantity, Tolerance, ToleranceViolation, Tolerances};
 

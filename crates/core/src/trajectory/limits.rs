@@ -39,37 +39,39 @@ impl JointLimits {
         self.limits.velocity * (1.0 + SPEED_TOLERANCE)
     }
 
-    /// Rejects a position outside the travel limits. `index` is the index of the point.
+    /// Returns true if a position, m or rad, is within the travel limits; false for NaN.
+    #[inline]
+    pub fn is_within_travel(&self, position: f64) -> bool {
+        let (min, max) = (self.limits.travel_min, self.limits.travel_max);
+        position >= min - TRAVEL_TOLERANCE && position <= max + TRAVEL_TOLERANCE
+    }
+
+    /// Rejects a position outside the travel limits. `index` is the index of the point; a single setpoint has none.
     ///
     /// # Errors
     /// [`RejectionCode::OutsideTravelLimits`], also for NaN.
     #[inline]
-    pub fn check_travel_limits(&self, index: usize, position: f64) -> Result<(), Rejection> {
-        let (min, max) = (self.limits.travel_min, self.limits.travel_max);
-        if position >= min - TRAVEL_TOLERANCE && position <= max + TRAVEL_TOLERANCE {
-            return Ok(());
-        }
-        Err(self.travel_rejection(index, position))
+    pub fn check_travel_limits(&self, index: Option<usize>, position: f64) -> Result<(), Rejection> {
+        if self.is_within_travel(position) { Ok(()) } else { Err(self.travel_rejection(index, position)) }
     }
 
     #[cold]
-    fn travel_rejection(&self, index: usize, position: f64) -> Rejection {
+    fn travel_rejection(&self, index: Option<usize>, position: f64) -> Rejection {
         let (min, max) = (self.limits.travel_min, self.limits.travel_max);
         let limit = if position < min { min } else { max };
         let unit = self.unit();
-        Rejection::new(
+        let point = index.map(|index| format!(", point {index}")).unwrap_or_default();
+        let rejection = Rejection::new(
             RejectionCode::OutsideTravelLimits,
             format!(
-                "{}, point {index}: position {} is outside the travel limits, {} to {}",
+                "{}{point}: position {} is outside the travel limits, {} to {}",
                 self.name,
                 position_text(position, unit),
                 position_text(min, unit),
                 position_text(max, unit)
             ),
-        )
-        .joint(&self.name)
-        .index(index)
-        .numbers(position, limit)
+        );
+        Rejection { index, ..rejection.joint(&self.name).numbers(position, limit) }
     }
 
     /// Rejects a position that is NaN or infinite.

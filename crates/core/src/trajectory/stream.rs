@@ -124,7 +124,7 @@ impl SetpointStream {
     ) -> Result<bool, Rejection> {
         let StreamedSetpoint { joint, position, sent } = setpoint;
         limits.check_finite(position)?;
-        limits.check_travel_limits(0, position)?;
+        limits.check_travel_limits(None, position)?;
         self.apply_delay(k, psec);
         let StreamedJoint { reach, preview, gate } = &mut self.joints[joint];
         let last_entry = preview.last_entry(psec[joint]);

@@ -240,7 +240,7 @@ impl Timeline {
         let at = |k: i64| path.state(k.saturating_mul(period).into()).position;
         let step = |k: i64| {
             let (before, position) = (at(k - 1), at(k));
-            limits.check_travel_limits(0, position)?;
+            limits.check_travel_limits(Some(0), position)?;
             limits.check_speed(0, (position - before) / seconds(period), "speed on the approach to it")
         };
         let join = begin / period;

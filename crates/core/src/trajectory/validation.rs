@@ -115,7 +115,7 @@ impl ColumnCheck<'_> {
     fn points(&self) -> Result<(), Rejection> {
         for index in 0..self.trajectory.points() {
             let point = self.trajectory.point(self.column, index);
-            self.joint.check_travel_limits(index, point.position)?;
+            self.joint.check_travel_limits(Some(index), point.position)?;
             self.joint.check_speed(index, point.velocity, "velocity")?;
         }
         Ok(())
@@ -183,7 +183,7 @@ impl ColumnCheck<'_> {
     }
 
     fn step(&self, point: usize, previous: &mut Option<f64>, position: f64) -> Result<(), Rejection> {
-        self.joint.check_travel_limits(point, position)?;
+        self.joint.check_travel_limits(Some(point), position)?;
         if let Some(before) = previous.replace(position) {
             let speed = (position - before) / seconds(self.period);
             self.joint.check_speed(point, speed, "speed")?;
@@ -206,7 +206,7 @@ pub(super) fn check_samples(
     for i in 0..=samples {
         let time = if i == samples { interval.1 } else { interval.0 + i * step };
         let state = segment.state(time);
-        joint.check_travel_limits(point, state.position)?;
+        joint.check_travel_limits(Some(point), state.position)?;
         joint.check_speed(point, state.velocity, "speed")?;
     }
     Ok(())

@@ -107,8 +107,7 @@ impl GridSource for ProgramSource {
         }
         self.program.psec(time, row);
         for (joint, &position) in self.limits.iter().zip(&*row) {
-            let index = usize::try_from(self.next).unwrap_or(usize::MAX);
-            joint.check_travel_limits(index, position).map_err(|rejection| {
+            joint.check_travel_limits(None, position).map_err(|rejection| {
                 let (block, _) = self.program.path().locate(self.program.progress(time));
                 Box::new(UnreachableError { name: self.name.clone(), index: block + 1, time, rejection })
             })?;

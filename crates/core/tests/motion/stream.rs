@@ -289,7 +289,9 @@ fn nan_infinity_and_positions_outside_the_travel_limits_are_rejected() {
         (0, 0.356, RejectionCode::OutsideTravelLimits),
         (2, 0.0, RejectionCode::UnknownJoint),
     ] {
-        assert_eq!(t.submit_setpoint(joint, position).unwrap_err().code, code);
+        let rejection = t.submit_setpoint(joint, position).unwrap_err();
+        assert_eq!((rejection.code, rejection.index), (code, None));
+        assert!(!rejection.text.contains("point"), "{rejection}");
     }
     assert!(!t.is_streaming());
 }

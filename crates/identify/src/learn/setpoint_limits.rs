@@ -81,7 +81,7 @@ pub(super) fn first_excess(
         limit,
     };
     let joint = JointLimits::from_axis(axis);
-    let outside = psec.iter().position(|&x| joint.check_travel_limits(0, x).is_err()).map(|k| {
+    let outside = psec.iter().position(|&x| !joint.is_within_travel(x)).map(|k| {
         let limit = if psec[k] < limits.travel_min - TRAVEL_TOLERANCE {
             limits.travel_min
         } else {

@@ -334,7 +334,7 @@ impl<R: Read> PsecCsvReader<R> {
                 return Err(number_error(column + 1));
             }
             joint
-                .check_travel_limits(after.index, position)
+                .check_travel_limits(Some(after.index), position)
                 .map_err(|rejection| PsecError::Point { at: at(), rejection })?;
         }
         if let Some(rows) = rows {

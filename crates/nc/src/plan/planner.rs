@@ -332,7 +332,7 @@ where
 
     pub(super) fn check_travel_limits(&self) -> Result<(), FeedPlanError> {
         for (joint, &position) in self.limits.iter().zip(&self.last.psec) {
-            if joint.check_travel_limits(0, position).is_err() {
+            if !joint.is_within_travel(position) {
                 return Err(FeedPlanError::OutsideTravelLimits {
                     line: self.last.line,
                     axis: joint.name.clone(),

@@ -46,7 +46,7 @@ class Stepper:
 
         `psec` are the setpoints of the cycle, m or rad. `preview` are the following setpoints, (axes, cycles) or of
         several machines (machines, axes, cycles), which predictive controllers read; beyond it they see the last one.
-        Raises `ValueError` for another shape or a value that is not finite.
+        Raises `ValueError` for another shape or a value beyond ±10⁶.
         """
         ahead = None if preview is None else np.asarray(preview, dtype=np.float64)
         return self._native.step(np.asarray(psec, dtype=np.float64), ahead)
