@@ -8,7 +8,7 @@ use virtual_axes_nc::motion::PathControl;
 use virtual_axes_nc::plan::PlanOptions;
 
 use crate::limits::{fine_machine, plan_on};
-use crate::programs::{Program, blend, raster};
+use crate::programs::{Program, blend, five_axis, raster};
 use crate::speed_search::{Grid, SampledPath};
 
 /// Longest time that is searched, relative to the planned time.
@@ -89,16 +89,5 @@ fn the_time_of_a_raster_is_near_the_optimum() {
 #[test]
 fn the_time_of_a_five_axis_path_is_near_the_optimum() {
     let machine = fine_machine();
-    let mut five_axis = Program::new(0.1, blend(20e-6));
-    five_axis.tcp_length = Some(machine.kinematics().tool_length);
-    for i in 1..=40 {
-        let t = f64::from(i) / 40.0;
-        let mut end = [0.0; 9];
-        end[0] = 0.06 * t;
-        end[1] = 0.01 * (6.0 * t).sin();
-        end[3] = 0.3 * t;
-        end[5] = 0.4 * t * t;
-        five_axis.line_to(end);
-    }
-    check("five axes", &five_axis, &machine, &COARSE);
+    check("five axes", &five_axis(machine.kinematics().tool_length), &machine, &COARSE);
 }

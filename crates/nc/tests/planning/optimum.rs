@@ -6,7 +6,7 @@ use virtual_axes_nc::motion::PathControl;
 use virtual_axes_nc::plan::PlanOptions;
 
 use crate::limits::{fine_machine, plan_on};
-use crate::programs::{Program, blend, raster};
+use crate::programs::{Program, blend, five_axis, raster};
 
 /// Relative tolerance of the limits in the search: that of the rounding of the samples.
 const TOLERANCE: f64 = 1e-6;
@@ -146,16 +146,5 @@ fn cycle_times_are_near_the_optimum() {
     square.line(0.03, 0.0, 0.0).line(0.03, 0.03, 0.0).line(0.0, 0.03, 0.0);
     check("square", &square, &machine);
     check("raster", &raster(2, 0.03, 50e-6, 1e-6, 0.1, 10e-6), &machine);
-    let mut five_axis = Program::new(0.1, blend(20e-6));
-    five_axis.tcp_length = Some(machine.kinematics().tool_length);
-    for i in 1..=40 {
-        let t = f64::from(i) / 40.0;
-        let mut end = [0.0; 9];
-        end[0] = 0.06 * t;
-        end[1] = 0.01 * (6.0 * t).sin();
-        end[3] = 0.3 * t;
-        end[5] = 0.4 * t * t;
-        five_axis.line_to(end);
-    }
-    check("five axes", &five_axis, &machine);
+    check("five axes", &five_axis(machine.kinematics().tool_length), &machine);
 }

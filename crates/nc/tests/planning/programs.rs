@@ -128,3 +128,19 @@ pub fn raster(rows: usize, length: f64, segment: f64, rounding: f64, feed: f64, 
     }
     program
 }
+
+/// Returns a wave of 40 lines on which A and C swivel, with TCP control of a tool of this length, m.
+pub fn five_axis(tool_length: f64) -> Program {
+    let mut program = Program::new(0.1, blend(20e-6));
+    program.tcp_length = Some(tool_length);
+    for i in 1..=40 {
+        let t = f64::from(i) / 40.0;
+        let mut end = [0.0; 9];
+        end[0] = 0.06 * t;
+        end[1] = 0.01 * (6.0 * t).sin();
+        end[3] = 0.3 * t;
+        end[5] = 0.4 * t * t;
+        program.line_to(end);
+    }
+    program
+}

@@ -153,6 +153,8 @@ def _distribution(key: str, bounds: Bounds, start: Any) -> optuna.distributions.
     low, high, *scale = bounds
     if not (math.isfinite(low) and math.isfinite(high) and low <= high) or scale not in ([], ["log"]):
         raise ValueError(f'{key}: bounds {bounds} must be finite, the lower one first, and may end with "log"')
+    if scale and low <= 0:
+        raise ValueError(f"{key}: bounds {bounds} must be above 0 on a logarithmic scale")
     if isinstance(start, bool) or not isinstance(start, int | float):
         raise ValueError(f"{key} is {start!r}; a search needs numbers")
     if isinstance(start, int):
