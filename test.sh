@@ -87,7 +87,7 @@ rust_checks() {
   renice -n 15 -p $BASHPID >/dev/null
   stage "cargo clippy" cargo clippy --release --workspace --all-targets --locked -- -D warnings &&
     stage "cargo doc" env RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --locked &&
-    stage "cargo test" cargo test --release --workspace --locked &&
+    stage "cargo test" cargo test --release --workspace --locked --no-fail-fast &&
     stage "short runs of the fuzz targets" tools/fuzz.sh short
 }
 

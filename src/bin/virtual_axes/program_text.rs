@@ -1,7 +1,7 @@
 //! Sentences on path and feed of a program.
 
 use virtual_axes_core::config::{AxisConfig, AxisKind};
-use virtual_axes_core::path::Program;
+use virtual_axes_core::path::{Block, Program};
 use virtual_axes_core::units::{DEGREE, MILLIMETER};
 
 use crate::axis::AxisUnits;
@@ -10,21 +10,21 @@ use crate::axis::AxisUnits;
 const REACHED: f64 = 0.5;
 /// Distance of start and end below which a path is closed, and range of a joint below which it stands still, m or rad.
 const RESOLUTION: f64 = 1e-9;
-/// Number of intervals in which the range of the joints is evaluated.
-const SAMPLES: u32 = 2000;
+/// Number of intervals of the path in which the range of the joints is evaluated, and the fewest of a move.
+const SAMPLES: usize = 2000;
+const FEWEST_SAMPLES: usize = 4;
 /// Distance in time over which the speed of a joint is evaluated, s.
 const PROBE: f64 = 1e-4;
 /// Fraction of the velocity limit from which a joint is at its limit.
 const AT_LIMIT: f64 = 0.995;
 
-/// Returns a warning if the program reaches less than half of its highest programmed feed, with the limit that acts at
-/// the highest feed.
+/// Returns a warning if linear or rotary moves reach less than half of their highest programmed feed, with the limit that
+/// acts at the highest feed.
 pub fn unreached_feed(program: &Program, axes: &[AxisConfig]) -> Option<String> {
-    let (programmed, (highest, time)) = (program.programmed_feed(), program.highest_feed());
-    if highest >= REACHED * programmed {
-        return None;
-    }
-    let (unit, symbol) = feed_unit(axes, &ranges(program));
+    let is_unreached =
+        |&kind: &AxisKind| program.highest_feed(kind).0 < REACHED * program.programmed_feed(kind);
+    let kind = kinds(program).find(is_unreached)?;
+    let (highest, time) = program.highest_feed(kind);
     let psec = |time: f64| {
         let mut out = vec![0.0; program.path().joint_count()];
         program.psec(time, &mut out);
@@ -38,22 +38,21 @@ pub fn unreached_feed(program: &Program, axes: &[AxisConfig]) -> Option<String> 
         None => "acceleration and jerk on these moves".to_owned(),
     };
     Some(format!(
-        "feed {:.2} {symbol} not reached, at most {:.2} {symbol}, limited by {limit}",
-        programmed / unit,
-        highest / unit
+        "feed {} not reached, at most {}, limited by {limit}",
+        feed_text(program.programmed_feed(kind), kind),
+        feed_text(highest, kind)
     ))
 }
 
-/// Returns size and symbol of the unit of feeds: rpm if only rotary axes move, else m/min.
-fn feed_unit(axes: &[AxisConfig], ranges: &[[f64; 2]]) -> (f64, &'static str) {
-    let moves = |kind| axes.iter().zip(ranges).any(|(axis, range)| axis.kind() == kind && moves(range));
-    let is_rotary = moves(AxisKind::Rotary) && !moves(AxisKind::Linear);
-    let units = AxisUnits::for_kind(if is_rotary { AxisKind::Rotary } else { AxisKind::Linear });
-    (units.speed, units.speed_name)
+/// Returns the kinds of the moves.
+fn kinds(program: &Program) -> impl Iterator<Item = AxisKind> {
+    [AxisKind::Linear, AxisKind::Rotary].into_iter().filter(|kind| program.programmed_feed(*kind) > 0.0)
 }
 
-fn moves(range: &[f64; 2]) -> bool {
-    range[1] - range[0] > RESOLUTION
+/// Formats a feed, m/s or rad/s, in m/min or rpm.
+fn feed_text(feed: f64, kind: AxisKind) -> String {
+    let units = AxisUnits::for_kind(kind);
+    format!("{:.2} {}", feed / units.speed, units.speed_name)
 }
 
 /// Returns the joint positions at a progress along the path.
@@ -65,11 +64,16 @@ fn joints(program: &Program, progress: f64) -> Vec<f64> {
 
 /// Returns the range of each joint on the path.
 fn ranges(program: &Program) -> Vec<[f64; 2]> {
+    let path = program.path();
     let mut ranges: Vec<[f64; 2]> = joints(program, 0.0).iter().map(|value| [*value; 2]).collect();
-    for sample in 1..=SAMPLES {
-        let at = joints(program, program.path().length() * f64::from(sample) / f64::from(SAMPLES));
-        for (range, value) in ranges.iter_mut().zip(at) {
-            *range = [range[0].min(value), range[1].max(value)];
+    let intervals = (SAMPLES / path.blocks().len()).max(FEWEST_SAMPLES);
+    for (index, block) in path.blocks().iter().enumerate() {
+        for sample in 1..=intervals {
+            let share = sample as f64 / intervals as f64;
+            let at = joints(program, path.start_of(index) + share * block.length());
+            for (range, value) in ranges.iter_mut().zip(at) {
+                *range = [range[0].min(value), range[1].max(value)];
+            }
         }
     }
     ranges
@@ -77,19 +81,24 @@ fn ranges(program: &Program) -> Vec<[f64; 2]> {
 
 /// Returns highest feed and path length, then a line with start, end and range of each joint that moves.
 pub fn description(program: &Program, axes: &[AxisConfig]) -> String {
-    let length = program.path().length();
-    let (start, end) = (joints(program, 0.0), joints(program, length));
-    let ranges = ranges(program);
+    let path = program.path();
+    let (start, end) = (joints(program, 0.0), joints(program, path.length()));
     let is_closed = start.iter().zip(&end).all(|(start, end)| (start - end).abs() < RESOLUTION);
-    let (unit, symbol) = feed_unit(axes, &ranges);
-    let length = match symbol {
-        "rpm" => format!("{:.3}°", length / DEGREE),
-        _ => format!("{:.3} mm", length / MILLIMETER),
+    let feeds: Vec<String> =
+        kinds(program).map(|kind| feed_text(program.highest_feed(kind).0, kind)).collect();
+    let length = |kind| {
+        let blocks = path.blocks().iter().filter(|block| block.kind() == kind);
+        let length: f64 = blocks.map(Block::length).sum();
+        match kind {
+            AxisKind::Linear => format!("{:.3} mm", length / MILLIMETER),
+            AxisKind::Rotary => format!("{:.3}°", length / DEGREE),
+        }
     };
-    let mut text = format!("highest feed: {:.2} {symbol}\n", program.highest_feed().0 / unit);
-    text += &format!("path: {length}, {}\n", if is_closed { "closed" } else { "open" });
-    for (((axis, range), start), end) in axes.iter().zip(ranges).zip(start).zip(end) {
-        if moves(&range) {
+    let lengths: Vec<String> = kinds(program).map(length).collect();
+    let shape = if is_closed { "closed" } else { "open" };
+    let mut text = format!("highest feed: {}\npath: {}, {shape}\n", feeds.join(", "), lengths.join(", "));
+    for (((axis, range), start), end) in axes.iter().zip(ranges(program)).zip(start).zip(end) {
+        if range[1] - range[0] > RESOLUTION {
             text += &joint_line(axis, [start, end], range, None);
         }
     }

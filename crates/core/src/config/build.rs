@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::check::to_ns;
 use super::coupling::{GantryConfig, WorkpieceConfig};
 use super::coupling_check::{
-    CENTER_OF_MASS, GANTRY_AXES, GANTRY_DAMPING, GANTRY_STIFFNESS, MOMENTS, WORKPIECE_MASS,
+    CENTER_OF_MASS, CONTOUR_GAIN, GANTRY_AXES, GANTRY_DAMPING, GANTRY_STIFFNESS, MOMENTS, WORKPIECE_MASS,
 };
 use super::definition::MotorKind;
 use super::error::{ConfigError, ValueSource};
@@ -52,7 +52,7 @@ impl Parameters {
                 .iter()
                 .map(|joint| AxisParameters { set: self, joint }.config())
                 .collect::<Result<_, _>>()?,
-            contour_gain: self.number("contour_control.gain")? * POSITION_GAIN,
+            contour_gain: self.number(CONTOUR_GAIN)? * POSITION_GAIN,
             workpiece: self.workpiece_config()?,
             gantry: self.gantry_config()?,
         })

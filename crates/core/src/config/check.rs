@@ -56,6 +56,7 @@ pub(super) fn check(
     set.check_clock()?;
     set.check_workpiece(origin)?;
     set.check_gantry(origin)?;
+    set.check_contour_control()?;
     for joint in &layout.joints {
         set.check_transmission(joint, origin)?;
         set.check_elasticity(joint, origin)?;

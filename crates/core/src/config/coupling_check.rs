@@ -1,4 +1,4 @@
-//! Validation of the couplings between axes: workpiece on two tables, gantry.
+//! Validation of the couplings between axes: workpiece on two tables, gantry, cross-coupled control.
 
 use super::check::{CrossChecks, missing};
 use super::error::{ConfigError, ValueSource};
@@ -13,6 +13,7 @@ pub(super) const MOMENTS: [&str; 3] =
     ["workpiece.inertia_x_kg_m2", "workpiece.inertia_y_kg_m2", "workpiece.inertia_z_kg_m2"];
 pub(super) const GANTRY_AXES: &str = "gantry.axes";
 pub(super) const GANTRY_STIFFNESS: &str = "gantry.stiffness_n_um";
+pub(super) const CONTOUR_GAIN: &str = "contour_control.gain";
 pub(super) const GANTRY_DAMPING: &str = "gantry.damping_n_s_m";
 
 impl CrossChecks<'_> {
@@ -83,6 +84,26 @@ impl CrossChecks<'_> {
         }
         let Value::TextList(names) = &entry.value else { return Ok(()) };
         self.check_coupled_transmissions(GANTRY_AXES, |name| names.iter().any(|own| own == name))
+    }
+
+    /// Checks that cross-coupled control has two of the linear axes x, y and z, and acts on both sides of a gantry or none.
+    pub(super) fn check_contour_control(&self) -> Result<(), ConfigError> {
+        if !self.is_nonzero(CONTOUR_GAIN) {
+            return Ok(());
+        }
+        let is_coordinate = |name: &str| ["x", "y", "z"].iter().any(|axis| name.eq_ignore_ascii_case(axis));
+        let linear = self.layout.joints.iter().filter(|joint| joint.axis == AxisKind::Linear);
+        if linear.filter(|joint| is_coordinate(&joint.name)).count() < 2 {
+            let allowed = "be 0 on a machine without two of the linear joints x, y and z";
+            return Err(self.rejection(&[CONTOUR_GAIN], allowed.to_owned()));
+        }
+        match self.entries.get(GANTRY_AXES).map(|entry| &entry.value) {
+            Some(Value::TextList(names)) if names.iter().any(|name| is_coordinate(name)) => {
+                let allowed = format!("not be given together: {CONTOUR_GAIN} and {GANTRY_AXES}");
+                Err(self.rejection(&[CONTOUR_GAIN, GANTRY_AXES], allowed))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Checks that coupled joints have no transmission that is stepped from event to event: its motion within a tick is not a

@@ -170,7 +170,7 @@ const MACHINE: &[ParameterDefinition] = &[
         .default(Number(0.0))
         .live()
         .describe(
-            "Gain of cross-coupled control of the linear axes, feedback of the contour error; 0 disables it.",
+            "Gain of cross-coupled control of X, Y and Z, feedback of the contour error; 0 disables it.",
         ),
     // Couplings between axes.
     ParameterDefinition::number("workpiece.mass_kg", "kg", 0.0, MAX_WORKPIECE_KG)

@@ -4,7 +4,7 @@ use std::fmt;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use crate::config::{AxisConfig, AxisKind, KinematicsConfig, MachineConfig};
+use crate::config::{AxisKind, KinematicsConfig, MachineConfig};
 
 /// Pose of the tool in the workpiece frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,8 +55,9 @@ impl AxisRole {
         }
     }
 
-    fn matches(self, axis: &AxisConfig) -> bool {
-        axis.kind() == self.kind() && axis.name().eq_ignore_ascii_case(self.name())
+    /// Returns true if a joint of this name and type can have the role; the first such joint of a machine has it.
+    pub fn matches(self, name: &str, kind: AxisKind) -> bool {
+        kind == self.kind() && name.eq_ignore_ascii_case(self.name())
     }
 }
 
@@ -96,7 +97,8 @@ impl Kinematics {
     /// Creates the kinematics of a machine.
     pub fn new(config: &MachineConfig) -> Self {
         let axes = config.axes();
-        let indices = AxisRole::ALL.map(|role| axes.iter().position(|axis| role.matches(axis)));
+        let indices =
+            AxisRole::ALL.map(|role| axes.iter().position(|axis| role.matches(axis.name(), axis.kind())));
         let travel_a = indices[AxisRole::A as usize].map(|index| axes[index].limits());
         Self {
             geometry: *config.kinematics(),

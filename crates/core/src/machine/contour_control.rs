@@ -1,13 +1,14 @@
-//! Cross-coupled control: feedback of the contour error, beside the position controllers of the linear axes.
+//! Cross-coupled control: feedback of the contour error, beside the position controllers of X, Y and Z.
 
-use crate::config::{AxisConfig, AxisKind, MachineConfig, Periods};
+use crate::config::{AxisConfig, MachineConfig, Periods};
 use crate::control::{CONTOUR_AXES, ContourVector, Rst, contour_error};
 use crate::design::{DesignError, PredictionModel, check_stable};
+use crate::kinematics::AxisRole;
 
 use super::bank::AxisBank;
 use super::{Axis, AxisError, AxisParameters, MachineError, design_controller, prediction_model};
 
-/// Cross-coupled control of the linear axes of one machine (Koren, Journal of Dynamic Systems, Measurement and Control
+/// Cross-coupled control of X, Y and Z of one machine (Koren, Journal of Dynamic Systems, Measurement and Control
 /// 102, 1980; with the contour error as a vector).
 ///
 /// ```text
@@ -20,12 +21,12 @@ use super::{Axis, AxisError, AxisParameters, MachineError, design_controller, pr
 pub(super) struct ContourControl {
     /// K, 1/s.
     gain: f64,
-    /// Indices of the linear axes.
+    /// Indices of the axes, in the order x, y, z.
     axes: Vec<usize>,
 }
 
 impl ContourControl {
-    /// Creates the control of the axes of `config` at `indices`; `None` without a gain or without two linear axes.
+    /// Creates the control of the axes of `config` at `indices`; `None` without a gain or without two of x, y and z.
     ///
     /// # Errors
     /// [`MachineError::Axis`] with [`AxisError::ContourControl`] if the gain makes the loop of an axis unstable.
@@ -73,11 +74,12 @@ impl ContourControl {
     }
 }
 
-/// Returns the indices of the axes on which cross-coupled control with the gain K, 1/s, acts: the first three linear ones;
-/// none without a gain or with a single linear axis.
+/// Returns the indices of the axes on which cross-coupled control with the gain K, 1/s, acts: the linear axes x, y and z, in
+/// this order; none without a gain or with a single one of them.
 pub fn contour_axes<'a>(gain: f64, axes: impl Iterator<Item = &'a AxisConfig>) -> Vec<usize> {
-    let linear = axes.enumerate().filter(|(_, axis)| axis.kind == AxisKind::Linear);
-    let found: Vec<usize> = linear.map(|(index, _)| index).take(CONTOUR_AXES).collect();
+    let axes: Vec<&AxisConfig> = axes.collect();
+    let index_of = |role: AxisRole| axes.iter().position(|axis| role.matches(&axis.name, axis.kind));
+    let found: Vec<usize> = AxisRole::LINEAR.into_iter().filter_map(index_of).collect();
     if gain > 0.0 && found.len() > 1 { found } else { Vec::new() }
 }
 

@@ -297,8 +297,12 @@ impl ProgramDraft {
             return Err(PlanError::NotComputable { index: self.moves.len(), found: t });
         }
         first_span.push(spans.len());
-        let programmed_feed = self.moves.iter().map(|parameters| parameters.feed).fold(0.0, f64::max);
-        Ok(Program { path: Arc::clone(&self.path), spans, first_span, duration: t, programmed_feed })
+        let mut programmed_feeds = [0.0; 2];
+        for (block, parameters) in self.path.blocks().iter().zip(&self.moves) {
+            let highest: &mut f64 = &mut programmed_feeds[block.kind() as usize];
+            *highest = highest.max(parameters.feed);
+        }
+        Ok(Program { path: Arc::clone(&self.path), spans, first_span, duration: t, programmed_feeds })
     }
 
     /// Returns the properties of each span that the verification needs.

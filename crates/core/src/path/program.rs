@@ -7,6 +7,7 @@ use super::block::Block;
 use super::cosine::CosineProfile;
 use super::geometry::Path;
 use super::profile::SpeedProfile;
+use crate::config::AxisKind;
 
 /// Limits along s for one move, in addition to the axis limits; ∞ means no limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -129,8 +130,8 @@ pub struct Program {
     /// Index of the first span of each block, followed by the number of spans.
     pub(super) first_span: Vec<usize>,
     pub(super) duration: f64,
-    /// Highest programmed feed of the moves, m/s or rad/s.
-    pub(super) programmed_feed: f64,
+    /// Highest programmed feed of the linear moves, m/s, and of the rotary moves, rad/s; 0 without such moves.
+    pub(super) programmed_feeds: [f64; 2],
 }
 
 impl Program {
@@ -144,14 +145,15 @@ impl Program {
         self.duration
     }
 
-    /// Returns the highest programmed feed of the moves, m/s or rad/s.
-    pub fn programmed_feed(&self) -> f64 {
-        self.programmed_feed
+    /// Returns the highest programmed feed of the moves of one kind, m/s or rad/s; 0 without such moves.
+    pub fn programmed_feed(&self, kind: AxisKind) -> f64 {
+        self.programmed_feeds[kind as usize]
     }
 
-    /// Returns the highest feed that is reached, m/s or rad/s, and a time at which it is reached, s.
-    pub fn highest_feed(&self) -> (f64, f64) {
-        let feeds = self.spans.iter().map(|span| {
+    /// Returns the highest feed that moves of one kind reach, m/s or rad/s, and a time at which it is reached, s.
+    pub fn highest_feed(&self, kind: AxisKind) -> (f64, f64) {
+        let spans = self.spans.iter().filter(|span| self.path.blocks()[span.block].kind() == kind);
+        let feeds = spans.map(|span| {
             let (feed, time) = span.profile.highest_speed();
             (feed, span.start + time)
         });

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use serde_saphyr::Spanned;
 
 use crate::config::{AxisKind, MachineConfig};
-use crate::kinematics::Kinematics;
+use crate::kinematics::{AxisRole, Kinematics};
 use crate::path::{Block, FeedProfile, Frame, Move, PathError, PathLimits, Program};
 use crate::text::shortened;
 use crate::trajectory::JointLimits;
@@ -38,8 +38,8 @@ pub(super) fn program(
         name,
         kinds: joints.iter().map(|joint| joint.kind).collect(),
         point: vec![0.0; joints.len()],
-        limits: PathLimits { acceleration: f64::INFINITY, jerk: f64::INFINITY },
-        feeds: DefaultFeeds::from_file(name, file, feed)?,
+        limits: UNLIMITED,
+        feeds: default_feeds(name, file, feed)?,
         moves: Vec::new(),
         joints,
     };
@@ -78,45 +78,57 @@ pub(super) fn program(
     Ok(program)
 }
 
-/// Default feeds of the moves: m/s for linear moves, rad/s for rotary moves.
+/// Value for linear moves and value for rotary moves, in m or rad and s.
 #[derive(Debug, Clone, Copy)]
-struct DefaultFeeds {
-    linear: Option<f64>,
-    rotary: Option<f64>,
+struct ByKind<T> {
+    linear: T,
+    rotary: T,
 }
 
-impl DefaultFeeds {
-    fn from_file(name: &str, file: &ScenarioFile, replaced: Option<f64>) -> Result<Self, ScenarioError> {
-        let own =
-            |entry: &&Spanned<MoveEntry>| entry.value.feed_m_min.is_some() || entry.value.feed_rpm.is_some();
-        let Some(feed) = replaced else {
-            return Ok(DefaultFeeds {
-                linear: feed_of(name, "feed_m_min", file.feed_m_min, METER_PER_MINUTE)?,
-                rotary: feed_of(name, "feed_rpm", file.feed_rpm, RPM)?,
-            });
-        };
-        if let Some(entry) = file.moves.iter().find(own) {
-            return Err(ScenarioError::Key {
-                at: at_line(name, entry),
-                key: "--feed".to_owned(),
-                reason:
-                    "cannot replace the feed of this move; only the default feed of the scenario is replaced"
-                        .to_owned(),
-            });
+impl<T: Copy> ByKind<T> {
+    fn of(&self, kind: AxisKind) -> T {
+        match kind {
+            AxisKind::Linear => self.linear,
+            AxisKind::Rotary => self.rotary,
         }
-        let DefaultFeeds { linear, rotary } = DefaultFeeds {
-            linear: file.feed_m_min.and(feed_of(name, "--feed", Some(YamlNumber(feed)), METER_PER_MINUTE)?),
-            rotary: file.feed_rpm.and(feed_of(name, "--feed", Some(YamlNumber(feed)), RPM)?),
-        };
-        if linear.is_some() && rotary.is_some() {
-            return Err(ScenarioError::Key {
-                at: name.to_owned(),
-                key: "--feed".to_owned(),
-                reason: "cannot replace both feed_m_min and feed_rpm of the scenario".to_owned(),
-            });
-        }
-        Ok(DefaultFeeds { linear, rotary })
     }
+}
+
+/// Limits of a path that has the limits of its axes only.
+const UNLIMITED: ByKind<PathLimits> = {
+    let limits = PathLimits { acceleration: f64::INFINITY, jerk: f64::INFINITY };
+    ByKind { linear: limits, rotary: limits }
+};
+
+/// Returns the default feeds of the moves; `replaced` is in m/min or rpm.
+fn default_feeds(
+    name: &str,
+    file: &ScenarioFile,
+    replaced: Option<f64>,
+) -> Result<ByKind<Option<f64>>, ScenarioError> {
+    let own =
+        |entry: &&Spanned<MoveEntry>| entry.value.feed_m_min.is_some() || entry.value.feed_rpm.is_some();
+    let Some(feed) = replaced else {
+        return Ok(ByKind {
+            linear: feed_of(name, "feed_m_min", file.feed_m_min, METER_PER_MINUTE)?,
+            rotary: feed_of(name, "feed_rpm", file.feed_rpm, RPM)?,
+        });
+    };
+    let wrong = |at: String, reason: &str| {
+        Err(ScenarioError::Key { at, key: "--feed".to_owned(), reason: reason.to_owned() })
+    };
+    if let Some(entry) = file.moves.iter().find(own) {
+        let reason =
+            "cannot replace the feed of this move; only the default feed of the scenario is replaced";
+        return wrong(at_line(name, entry), reason);
+    }
+    if file.feed_m_min.is_some() && file.feed_rpm.is_some() {
+        return wrong(name.to_owned(), "cannot replace both feed_m_min and feed_rpm of the scenario");
+    }
+    Ok(ByKind {
+        linear: file.feed_m_min.and(feed_of(name, "--feed", Some(YamlNumber(feed)), METER_PER_MINUTE)?),
+        rotary: file.feed_rpm.and(feed_of(name, "--feed", Some(YamlNumber(feed)), RPM)?),
+    })
 }
 
 struct ProgramBuilder<'a> {
@@ -125,8 +137,8 @@ struct ProgramBuilder<'a> {
     kinds: Vec<AxisKind>,
     /// Start of the next move, programmed coordinates.
     point: Vec<f64>,
-    limits: PathLimits,
-    feeds: DefaultFeeds,
+    limits: ByKind<PathLimits>,
+    feeds: ByKind<Option<f64>>,
     moves: Vec<Move>,
 }
 
@@ -144,6 +156,7 @@ impl ProgramBuilder<'_> {
             return Err(wrong("a move must have exactly one of line, arc, spline, dwell_s"));
         }
         if let Some(YamlNumber(dwell)) = entry.dwell_s {
+            reject_keys(entry, &OPTIONS, "a dwell", &at)?;
             check_time(&at, "dwell_s", dwell)?;
             let Some(last) = self.moves.last_mut() else {
                 return Err(wrong("dwell_s must follow a move; use rest_s for a rest before the first move"));
@@ -170,7 +183,16 @@ impl ProgramBuilder<'_> {
         } else {
             return Err(wrong("a move must have exactly one of line, arc, spline, dwell_s"));
         };
-        let feed = self.feed(entry, block.kind(), &at)?;
+        let kind = block.kind();
+        match kind {
+            AxisKind::Linear => {
+                reject_keys(entry, &["feed_rpm", "corner_rpm"], "a move of linear axes", &at)?
+            }
+            AxisKind::Rotary => {
+                reject_keys(entry, &["feed_m_min", "corner_m_min"], "a move of rotary axes only", &at)?;
+            }
+        }
+        let feed = self.feed(entry, kind, &at)?;
         if let FeedProfile::Cosine { ramp } = profile
             && feed * ramp > block.length() * (1.0 + RAMP_TOLERANCE)
         {
@@ -180,12 +202,12 @@ impl ProgramBuilder<'_> {
             );
             return Err(value_error(&at, "ramp_s", ramp, &allowed));
         }
-        let corner = match block.kind() {
+        let corner = match kind {
             AxisKind::Linear => feed_of(&at, "corner_m_min", entry.corner_m_min, METER_PER_MINUTE)?,
             AxisKind::Rotary => feed_of(&at, "corner_rpm", entry.corner_rpm, RPM)?,
         };
         block.point(block.length(), &mut self.point);
-        self.moves.push(Move { block, feed, corner, limits: self.limits, profile, dwell: 0.0 });
+        self.moves.push(Move { block, feed, corner, limits: self.limits.of(kind), profile, dwell: 0.0 });
         Ok(())
     }
 
@@ -210,8 +232,12 @@ impl ProgramBuilder<'_> {
         for (key, &YamlNumber(value)) in &arc.center {
             center.push(coordinate(key, value, &self.joints, at)?);
         }
-        // The order of the coordinates is that of the machine, not that of the file.
-        center.sort_by_key(|&(index, _)| index);
+        // Axes named x, y and z come first, in this order; the others in the order of the machine, not of the file.
+        center.sort_by_key(|&(index, _)| {
+            let joint = &self.joints[index];
+            let role = AxisRole::LINEAR.iter().position(|role| role.matches(&joint.name, joint.kind));
+            (role.unwrap_or(AxisRole::LINEAR.len()), index)
+        });
         let [(first, u), (second, v)] = center[..] else {
             let reason = format!("center must have two coordinates, found {}", center.len());
             return Err(ScenarioError::Move { at: at.to_owned(), reason });
@@ -257,14 +283,30 @@ impl ProgramBuilder<'_> {
 
     /// Returns the feed of a move of type `kind`, m/s or rad/s.
     fn feed(&self, entry: &MoveEntry, kind: AxisKind, at: &str) -> Result<f64, ScenarioError> {
-        let (key, own, unit, default) = match kind {
-            AxisKind::Linear => ("feed_m_min", entry.feed_m_min, METER_PER_MINUTE, self.feeds.linear),
-            AxisKind::Rotary => ("feed_rpm", entry.feed_rpm, RPM, self.feeds.rotary),
+        let (key, own, unit) = match kind {
+            AxisKind::Linear => ("feed_m_min", entry.feed_m_min, METER_PER_MINUTE),
+            AxisKind::Rotary => ("feed_rpm", entry.feed_rpm, RPM),
         };
-        feed_of(at, key, own, unit)?.or(default).ok_or_else(|| ScenarioError::Move {
+        feed_of(at, key, own, unit)?.or(self.feeds.of(kind)).ok_or_else(|| ScenarioError::Move {
             at: at.to_owned(),
             reason: format!("{key} is missing; set it for this move or for the scenario"),
         })
+    }
+}
+
+/// Options of a move.
+const OPTIONS: [&str; 5] = ["feed_m_min", "feed_rpm", "corner_m_min", "corner_rpm", "ramp_s"];
+
+/// Rejects options of a move that do not apply to it.
+fn reject_keys(entry: &MoveEntry, keys: &[&str], found: &str, at: &str) -> Result<(), ScenarioError> {
+    let values = [entry.feed_m_min, entry.feed_rpm, entry.corner_m_min, entry.corner_rpm, entry.ramp_s];
+    match OPTIONS.iter().zip(values).find(|(key, value)| keys.contains(key) && value.is_some()) {
+        Some((key, _)) => Err(ScenarioError::Key {
+            at: at.to_owned(),
+            key: (*key).to_owned(),
+            reason: format!("does not apply to {found}"),
+        }),
+        None => Ok(()),
     }
 }
 
@@ -320,14 +362,14 @@ pub(super) fn notes_on_limits(values: &Values, machine: &MachineConfig) -> Vec<S
 }
 
 /// Parses the path limits, which apply in addition to the axis limits.
-fn path_limits(values: &Values, at: &str) -> Result<PathLimits, ScenarioError> {
-    let mut limits = PathLimits { acceleration: f64::INFINITY, jerk: f64::INFINITY };
+fn path_limits(values: &Values, at: &str) -> Result<ByKind<PathLimits>, ScenarioError> {
+    let mut limits = UNLIMITED;
     for (key, &YamlNumber(value)) in values {
         let (limit, unit) = match key.as_str() {
-            "acceleration_m_s2" => (&mut limits.acceleration, 1.0),
-            "acceleration_rev_s2" => (&mut limits.acceleration, REVOLUTION),
-            "jerk_m_s3" => (&mut limits.jerk, 1.0),
-            "jerk_rev_s3" => (&mut limits.jerk, REVOLUTION),
+            "acceleration_m_s2" => (&mut limits.linear.acceleration, 1.0),
+            "acceleration_rev_s2" => (&mut limits.rotary.acceleration, REVOLUTION),
+            "jerk_m_s3" => (&mut limits.linear.jerk, 1.0),
+            "jerk_rev_s3" => (&mut limits.rotary.jerk, REVOLUTION),
             _ => {
                 return Err(ScenarioError::Key {
                     at: at.to_owned(),

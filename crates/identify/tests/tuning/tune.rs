@@ -142,7 +142,7 @@ fn the_cascade_is_tuned_within_the_margins() {
     let problem = TuningProblem::new(&parameters, &workload, &cost, &NoProgress).expect("a tuning problem");
     let limits = MarginLimits { modulus: 0.7, delay: 0.02 };
     let found = tune_cascade(&problem, &limits, 1).expect("a tuning");
-    // The feedforward lead of the present machine costs ΔR ≈ v²/(R Kp) Tsp/2: 167 µm here.
+    // The feedforward lag of the present machine costs ΔR ≈ v²/(R Kp) Tsp/2: 167 µm here.
     assert!(problem.present().cost > 150.0, "{}", problem.present().cost);
     assert!(found.best.cost < problem.present().cost / 5.0, "{}", found.best.cost);
     let Tuning::Cascade(axes) = &found.best.tuning else { panic!("{}", found.best.tuning) };

@@ -192,8 +192,14 @@ fn errors_name_file_line_and_column() {
         error("time,x\n0,0\n0,006,0\n"),
         "p.csv:3: 3 values, the header names 2 columns; decimals must be separated by a point, not by a comma"
     );
-    assert_eq!(error("time,x\n-0.1,0\n"), "p.csv:2: time is -0.1 s, must lie in 0 … 100000000 s");
-    assert_eq!(error("time,x\n0,0\n2e8,1\n"), "p.csv:3: time is 200000000 s, must lie in 0 … 100000000 s");
+    assert_eq!(
+        error("time,x\n-0.1,0\n"),
+        "p.csv:2: time is -0.1 s, must lie in 0 … 360000 s (100 h); is the column in s?"
+    );
+    assert_eq!(
+        error("time,x\n0,0\n2e8,1\n"),
+        "p.csv:3: time is 200000000 s, must lie in 0 … 360000 s (100 h); is the column in s?"
+    );
     assert_eq!(
         error("time,x\n0,0\n0.006,0\n0.006,0\n"),
         "p.csv:4: time is 0.006 s, must be later than 0.006 s of the previous row"

@@ -1,6 +1,7 @@
 //! One simulated run with its variant of the machine.
 
 use virtual_axes_core::config::{MachineConfig, Parameters, Value};
+use virtual_axes_core::kinematics::{AxisRole, Kinematics};
 use virtual_axes_core::trial::TrialOutcome;
 
 use super::{ProgramReport, axis_warnings, table};
@@ -71,12 +72,31 @@ impl SimulatedRun {
             .collect()
     }
 
-    /// Returns warnings on the loops of the moving axes, and on a gantry of which one axis rests.
+    /// Returns warnings on the loops of the moving axes, on a gantry of which one axis rests, and on moving axes that the
+    /// contour error does not contain.
     pub fn axis_warnings(&self) -> Vec<String> {
         let figures = self.outcome.figures.axes.iter();
         let moving = self.machine.axes().iter().zip(figures).filter(|(_, figures)| figures.moves);
         let loops = moving.flat_map(|(axis, _)| axis_warnings::loops(axis, &self.machine.periods()));
-        loops.chain(self.resting_gantry_axis()).collect()
+        loops.chain(self.resting_gantry_axis()).chain(self.axes_without_role()).collect()
+    }
+
+    /// Returns a warning on moving axes that have no part in the contour error; the second axis of a gantry needs none.
+    fn axes_without_role(&self) -> Option<String> {
+        self.outcome.figures.contour?;
+        let kinematics = Kinematics::new(&self.machine);
+        let roles = AxisRole::ALL.map(|role| kinematics.role(role));
+        let is_in_gantry = |index| self.machine.gantry().is_some_and(|gantry| gantry.axes.contains(&index));
+        let axes = self.outcome.figures.axes.iter().enumerate();
+        let without = axes
+            .filter(|(index, axis)| axis.moves && !roles.contains(&Some(*index)) && !is_in_gantry(*index));
+        let names: Vec<&str> = without.map(|(_, axis)| axis.name.as_str()).collect();
+        (!names.is_empty()).then(|| {
+            format!(
+                "the contour error does not contain {}: the tool is moved by joints named x, y, z, a and c",
+                names.join(", ")
+            )
+        })
     }
 
     /// Returns a warning if only one axis of a gantry has setpoints that move.

@@ -29,7 +29,11 @@ fn single(run: &SimulatedRun) -> String {
 }
 
 fn compared(first: &SimulatedRun, run: &SimulatedRun) -> String {
-    let [from, to] = [main_figure(&first.outcome.figures), main_figure(&run.outcome.figures)];
+    let from = main_figure(&first.outcome.figures);
+    let figures = &run.outcome.figures;
+    let same = |to: &Figure| to.subject == from.subject && to.name == from.name;
+    let to = figure::of_path(figures, false).into_iter().chain(figure::of_axes(figures)).find(same);
+    let to = to.unwrap_or_else(|| main_figure(figures));
     let change = percent(&from, &to).map(|change| format!(", {change}")).unwrap_or_default();
     let warnings = warnings(run);
     let (title, name) = (run.title(), without_max(&to));
