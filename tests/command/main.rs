@@ -10,6 +10,7 @@ mod files_output;
 mod hints;
 mod identify_command;
 mod identify_elastic;
+mod identify_options;
 mod identify_traces;
 mod ingress_properties;
 mod interface;

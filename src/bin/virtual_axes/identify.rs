@@ -11,10 +11,11 @@ use virtual_axes_identify::identify::{
     IdentificationOptions, IdentifiedValue, RefinementScope,
 };
 use virtual_axes_identify::recording::{Finding, Severity};
-use virtual_axes_io::files::{OutputFile, read_recording};
+use virtual_axes_io::files::OutputFile;
 use virtual_axes_report::{IdentificationPage, ValidationRecording};
 
 use crate::campaign::FeedforwardName;
+use crate::identify_axes as axes;
 use crate::identify_columns as columns;
 use crate::identify_result::InvalidResult;
 use crate::input::must_not_replace;
@@ -126,8 +127,8 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     };
     let is_all = name == ALL;
     let (indices, resting) = if is_all {
-        let recorded = columns::recorded_axes(&arguments.listed(), &arguments.reading, &config)?;
-        moving_axes(arguments, &config, recorded)?
+        axes::check_options(&arguments.reading)?;
+        axes::moving_axes(&arguments.listed(), &arguments.reading, &config)?
     } else {
         (vec![axis::index(&config, name)?], Vec::new())
     };
@@ -136,8 +137,8 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
             format!("{}: --axis all writes no report; give the name of one axis", page.display()).into()
         );
     }
-    let mut failures = Vec::new();
     let spinner = Spinner::new();
+    let mut failures = Vec::new();
     let (mut texts, mut summaries, mut present) = (Vec::new(), Vec::new(), parameters);
     for index in indices {
         let config = present.machine_config()?;
@@ -172,34 +173,6 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
 
 /// Value of `--axis` for all recorded axes.
 const ALL: &str = "all";
-/// Range of the setpoint, or else of the position, of an axis at rest, m or rad.
-const AT_REST: f64 = 2e-5;
-
-/// Returns the axes that move in one of the recordings, and the names of the others.
-fn moving_axes(
-    arguments: &IdentifyArguments,
-    config: &MachineConfig,
-    axes: Vec<usize>,
-) -> Result<(Vec<usize>, Vec<String>), Box<dyn Error>> {
-    let options = arguments.reading.options()?;
-    let moves = |index: &usize| {
-        let axis = &config.axes()[*index];
-        arguments.listed().iter().any(|path| {
-            // The identification reports a recording that cannot be read.
-            let Ok((raw, _)) = read_recording(path, axis, &options) else { return true };
-            let signal = raw.psec.or(raw.position).unwrap_or_default();
-            let range = |bounds: (f64, f64), x: &f64| (bounds.0.min(*x), bounds.1.max(*x));
-            let (least, most) = signal.iter().fold((f64::INFINITY, f64::NEG_INFINITY), range);
-            most - least > AT_REST
-        })
-    };
-    let (moving, resting): (Vec<usize>, Vec<usize>) = axes.into_iter().partition(moves);
-    let names: Vec<String> = resting.iter().map(|index| config.axes()[*index].name().to_owned()).collect();
-    if moving.is_empty() {
-        return Err(format!("--axis all: no axis moves in the recordings ({})", names.join(", ")).into());
-    }
-    Ok((moving, names))
-}
 
 /// Returns the output for one axis, without JSON.
 fn output(arguments: &IdentifyArguments, summary: &IdentificationSummary) -> String {

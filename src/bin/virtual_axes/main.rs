@@ -14,6 +14,7 @@ mod design;
 mod design_output;
 mod fmu;
 mod identify;
+mod identify_axes;
 mod identify_columns;
 mod identify_result;
 mod identify_text;

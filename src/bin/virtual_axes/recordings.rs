@@ -4,6 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use virtual_axes_core::config::{AxisConfig, Periods};
+use virtual_axes_core::text::shortened;
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::identify::{ConditionedRecording, FeedforwardMode};
 use virtual_axes_identify::recording::{Conditioning, PsecShift};
@@ -66,6 +67,18 @@ impl RecordingArguments {
     /// Returns the file with column mappings, if given.
     pub fn map(&self) -> Option<&Path> {
         self.columns.as_deref()
+    }
+
+    /// Returns the option that names the signals of one axis, if given.
+    ///
+    /// # Errors
+    /// Returns an error if a column mapping is invalid.
+    pub fn single_axis_option(&self) -> Result<Option<String>, Box<dyn Error>> {
+        if let Some(joint) = &self.joint {
+            return Ok(Some(format!("--joint {}", shortened(joint))));
+        }
+        let columns = Columns::read(self.map(), &self.column, "--column")?;
+        Ok(columns.single_axis_mapping())
     }
 
     /// Sets the lag of the current to 0 unless it is given, in place of an estimate.

@@ -238,6 +238,17 @@ impl Columns {
         Ok(())
     }
 
+    /// Returns the first entry that selects the column of a channel of one axis, with its origin: `--column
+    /// position=Pos1`. Time, and units of default columns, belong to all axes.
+    pub fn single_axis_mapping(&self) -> Option<String> {
+        let selects = |mapping: &&Mapping| {
+            mapping.channel != Channel::Time && !matches!(mapping.column, Column::Default)
+        };
+        let mapping = self.mappings.iter().find(selects)?;
+        let separator = if mapping.at.starts_with("--") { " " } else { ": " };
+        Some(format!("{}{separator}{}={}", mapping.at, mapping.channel, shortened(&mapping.text)))
+    }
+
     /// Returns the mapping of a channel, if set.
     pub(super) fn mapping(&self, channel: Channel) -> Option<&Mapping> {
         self.mappings.iter().find(|mapping| mapping.channel == channel)
