@@ -96,6 +96,50 @@ fn all_axes_are_identified_into_one_machine_file() {
     assert!(text.contains("position RMS from PSEC "), "{text}");
 }
 
+/// Moves of X and Y with a lag of three and four position cycles of 2 ms.
+const TWO_AXES: &str = "description: two axes
+frame: joints
+moves:
+  - line: {x_mm: -116.139, y_mm: -111.114}
+    feed_m_min: 12.65
+  - dwell_s: 0.3
+  - line: {x_mm: -211.28, y_mm: 13.833}
+    feed_m_min: 7.52
+  - line: {x_mm: -104.843, y_mm: 124.029}
+    feed_m_min: 9
+  - line: {x_mm: 132.197, y_mm: -85.838}
+    feed_m_min: 18.3
+  - dwell_s: 0.3
+  - line: {x_mm: 75.549, y_mm: 1.667}
+    feed_m_min: 5.1
+";
+
+#[test]
+fn all_axes_are_identified_with_one_position_cycle() {
+    let folder = TestFolder::new("identify_cycle");
+    let file = |name: &str| folder.0.join(name).to_string_lossy().into_owned();
+    let (program, trace, out) = (file("moves.yaml"), file("trace.csv"), file("identified.yaml"));
+    std::fs::write(&program, TWO_AXES).expect("a program");
+    let truth = ["periods.position_ms=2", "x.delays.alpha_ms=6", "x.delays.beta_ms=4", "y.delays.alpha_ms=8"];
+    let truth: Vec<&str> = truth.iter().flat_map(|set| ["--set", set]).collect();
+    let record = ["run", &program, "--trace", &trace, "--trace-period", "20ms", "--quiet"];
+    printed(&[record.as_slice(), &truth].concat());
+    // The lag of X is divided by the position cycle of the default machine, 6 ms, that of Y is not.
+    let identify = ["identify", &trace, "--axis", "all", "--feedforward", "both", "--json", "--out", &out];
+    let found = json(&[identify.as_slice(), &REFINE].concat());
+    let x = &found[0];
+    let finding =
+        x["findings"].as_array().into_iter().flatten().find(|f| f["code"] == "position-cycle-shared");
+    let text = finding.and_then(|finding| finding["text"].as_str()).expect("a finding");
+    assert_eq!(text, "identified again with a position cycle of 2 ms, which y requires and all axes share");
+    for (axis, alpha) in found.as_array().expect("a list").iter().zip([6.0, 8.0]) {
+        let delay = &axis["delays"][0];
+        assert_eq!(delay["interval_ms"], serde_json::json!([alpha - 2.0, alpha]), "{delay}");
+    }
+    let machine = std::fs::read_to_string(&out).expect("it is there");
+    assert!(machine.contains("position_ms: 2.0  # identified: "), "{machine}");
+}
+
 #[test]
 fn an_invalid_result_is_printed_but_not_written() {
     let (files, folder) = (&*FILES, TestFolder::new("identify_invalid"));

@@ -15,7 +15,7 @@ use virtual_axes_io::files::OutputFile;
 use virtual_axes_report::{IdentificationPage, ValidationRecording};
 
 use crate::campaign::FeedforwardName;
-use crate::identify_axes as axes;
+use crate::identify_axes::{self as axes, AxesResult};
 use crate::identify_columns as columns;
 use crate::identify_result::InvalidResult;
 use crate::input::must_not_replace;
@@ -138,31 +138,28 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
         );
     }
     let spinner = Spinner::new();
-    let mut failures = Vec::new();
-    let (mut texts, mut summaries, mut present) = (Vec::new(), Vec::new(), parameters);
-    for index in indices {
-        let config = present.machine_config()?;
-        let found = match identify(arguments, &present, &config, index, &spinner) {
-            Err(error) if is_all => {
-                failures.push(format!("{}: {error}", config.axes()[index].name()));
-                continue;
-            }
-            found => found?,
-        };
+    let one = |parameters: &Parameters, index: usize| {
+        let config = parameters.machine_config()?;
+        identify(arguments, parameters, &config, index, &spinner)
+    };
+    let found = if is_all {
+        axes::identify_all(&parameters, &indices, one)?
+    } else {
+        let found = one(&parameters, indices.first().copied().unwrap_or_default())?;
         spinner.set_activity("writing")?;
         if let Some(page) = &arguments.report {
             write_report(page, &found, config.periods())?;
         }
-        texts.push(output(arguments, &found.summary));
-        summaries.push(found.summary);
-        present = found.identified;
-    }
+        AxesResult { summaries: vec![found.summary], failures: Vec::new(), identified: found.identified }
+    };
+    let AxesResult { summaries, failures, identified } = found;
+    let mut texts: Vec<String> = summaries.iter().map(|summary| output(arguments, summary)).collect();
     if let Some(reason) = InvalidResult::reason(&summaries, &failures) {
         drop(spinner);
         return Err(Box::new(InvalidResult { text: joined(arguments, &summaries, &texts)?, reason }));
     }
     if let Some(out) = &arguments.out {
-        machine_file::write(out, &machine_text(arguments, &summaries, &present))?;
+        machine_file::write(out, &machine_text(arguments, &summaries, &identified))?;
     }
     drop(spinner);
     if !resting.is_empty() && arguments.output.format() == OutputFormat::Text {

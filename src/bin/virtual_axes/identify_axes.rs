@@ -3,12 +3,17 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::config::{MachineConfig, Parameters, Value, ValueSource};
+use virtual_axes_identify::identify::summary::IdentificationSummary;
+use virtual_axes_identify::identify::{AxisIdentification, update_parameters};
+use virtual_axes_identify::recording::Finding;
 use virtual_axes_io::files::read_recording;
 
 use crate::identify_columns::recorded_axes;
 use crate::recordings::RecordingArguments;
 
+/// Parameter of the position cycle, which all axes share.
+const POSITION_CYCLE: &str = "periods.position_ms";
 /// Range of the setpoint, or else of the position, of an axis at rest, m or rad.
 const AT_REST: f64 = 2e-5;
 
@@ -48,4 +53,138 @@ pub fn moving_axes(
         return Err(format!("--axis all: no axis moves in the recordings ({})", names.join(", ")).into());
     }
     Ok((moving, names))
+}
+
+/// Results of the axes of a machine.
+pub struct AxesResult {
+    /// Figures of each identified axis.
+    pub summaries: Vec<IdentificationSummary>,
+    /// Axes without a result, with the reason.
+    pub failures: Vec<String>,
+    /// Machine with the identified values of all axes.
+    pub identified: Parameters,
+}
+
+/// Identifies the axes of the machine `parameters` one after the other by `identify`.
+///
+/// An axis can require a shorter position cycle, which all axes share: then the axes that were identified with another
+/// cycle are identified again. Since cycles become shorter only, this ends.
+pub fn identify_all(
+    parameters: &Parameters,
+    axes: &[usize],
+    identify: impl Fn(&Parameters, usize) -> Result<AxisIdentification, Box<dyn Error>>,
+) -> Result<AxesResult, Box<dyn Error>> {
+    let mut results: Vec<AxisResult> = axes.iter().map(|axis| AxisResult::Open(*axis)).collect();
+    let mut initial = parameters.clone();
+    let mut cause = None;
+    loop {
+        let mut present = initial.clone();
+        for result in &mut results {
+            result.complete(&mut present, cause.as_deref(), &identify);
+        }
+        let cycle = position_cycle(&present);
+        if results.iter().all(|result| result.fits(cycle)) {
+            return Ok(collected(results, present));
+        }
+        cause = Some(cause_of(cycle, &results));
+        initial.set(POSITION_CYCLE, Value::Double(cycle), &ValueSource::named("identification"))?;
+        for result in &mut results {
+            result.reopen(cycle);
+        }
+    }
+}
+
+/// Returns the position cycle, ms.
+fn position_cycle(parameters: &Parameters) -> f64 {
+    match parameters.get(POSITION_CYCLE) {
+        Some(Value::Double(cycle)) => cycle,
+        _ => f64::NAN,
+    }
+}
+
+/// State of an axis.
+enum AxisResult {
+    /// Axis to be identified.
+    Open(usize),
+    /// Axis that cannot be identified, with the reason.
+    Failed(String),
+    /// Identified axis: index, figures, and position cycle in ms.
+    Identified(usize, Box<IdentificationSummary>, f64),
+}
+
+impl AxisResult {
+    /// Identifies an open axis; adds its values to the machine `present`. `cause` is the reason of a repetition.
+    fn complete(
+        &mut self,
+        present: &mut Parameters,
+        cause: Option<&str>,
+        identify: impl Fn(&Parameters, usize) -> Result<AxisIdentification, Box<dyn Error>>,
+    ) {
+        match self {
+            AxisResult::Failed(_) => {}
+            AxisResult::Identified(_, summary, _) => {
+                let mut updated = present.clone();
+                let result = update_parameters(&mut updated, &summary.axis, &summary.values);
+                // Values outside their range are a finding of the summary.
+                if result.is_ok() && updated.machine_config().is_ok() {
+                    *present = updated;
+                }
+            }
+            AxisResult::Open(index) => match identify(present, *index) {
+                Ok(AxisIdentification { mut summary, identified, .. }) => {
+                    let cycle = position_cycle(&identified);
+                    summary.findings.extend(cause.map(|cause| Finding::note("position-cycle-shared", cause)));
+                    *self = AxisResult::Identified(*index, Box::new(summary), cycle);
+                    *present = identified;
+                }
+                Err(error) => {
+                    let config = present.machine_config();
+                    let name = config.ok().map(|config| config.axes()[*index].name().to_owned());
+                    *self = AxisResult::Failed(format!("{}: {error}", name.unwrap_or_default()));
+                }
+            },
+        }
+    }
+
+    /// Returns true if the axis was identified with this position cycle, ms, or not at all.
+    fn fits(&self, cycle: f64) -> bool {
+        !matches!(self, AxisResult::Identified(_, _, other) if *other != cycle)
+    }
+
+    /// Discards the result with another position cycle, ms.
+    fn reopen(&mut self, cycle: f64) {
+        if let AxisResult::Identified(index, _, other) = *self
+            && other != cycle
+        {
+            *self = AxisResult::Open(index);
+        }
+    }
+}
+
+/// Returns the reason of a repetition with another position cycle, ms: the axes that require it.
+fn cause_of(cycle: f64, results: &[AxisResult]) -> String {
+    let requires = |result: &AxisResult| match result {
+        AxisResult::Identified(_, summary, other) if *other == cycle => {
+            let changes = summary.values.iter().any(|value| value.key == POSITION_CYCLE);
+            changes.then(|| summary.axis.clone())
+        }
+        _ => None,
+    };
+    let names: Vec<String> = results.iter().filter_map(requires).collect();
+    format!(
+        "identified again with a position cycle of {cycle} ms, which {} requires and all axes share",
+        names.join(", ")
+    )
+}
+
+fn collected(results: Vec<AxisResult>, identified: Parameters) -> AxesResult {
+    let (mut summaries, mut failures) = (Vec::new(), Vec::new());
+    for result in results {
+        match result {
+            AxisResult::Identified(_, summary, _) => summaries.push(*summary),
+            AxisResult::Failed(reason) => failures.push(reason),
+            AxisResult::Open(_) => {}
+        }
+    }
+    AxesResult { summaries, failures, identified }
 }
