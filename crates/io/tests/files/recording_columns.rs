@@ -301,6 +301,35 @@ fn units_of_detected_columns_must_fit_the_axis() {
 }
 
 #[test]
+fn a_current_in_an_unknown_unit_is_rejected() {
+    for (header, unit) in [
+        ("X current [%]", "%"),
+        ("X current (%)", "%"),
+        ("X current in %", "%"),
+        ("X current %", "%"),
+        ("X current [% of max]", "% of max"),
+        ("X current [A rms]", "A rms"),
+        ("X current [Arms]", "Arms"),
+    ] {
+        let message = Recorded::new("percent", format!("time;x position [mm];{header}\n0;1;2\n")).error("x");
+        let expected = format!(
+            "current from column {header} has the unknown unit {unit}, must be in one of A, mA, N.m, N;"
+        );
+        assert!(message.contains(&expected), "{message}");
+    }
+    // Brackets without a unit.
+    for header in ["X current (actual value)", "current (X axis)", "X current (no load)", "current [X] in A"]
+    {
+        let found = Recorded::new("unit", format!("time;x position [mm];{header}\n0;1;2\n")).read("x");
+        assert!(found.is_ok(), "{header}: {found:?}");
+    }
+    let given = Recorded::new("percent", "time;x position [mm];X current [%]\n0;1;2\n")
+        .columns(&["current=X current [%][0.5 A]"])
+        .good("x");
+    assert_eq!(given.current, Some(vec![1.0]));
+}
+
+#[test]
 fn a_sampling_rate_replaces_a_column_of_time() {
     let text = "position [mm],current\n1,2\n3,4\n5,6\n";
     assert_eq!(Recorded::new("rate", text).rate(500.0).good("x").time, [0.0, 0.002, 0.004]);

@@ -356,7 +356,10 @@ impl<'a> Selector<'a> {
                         .collect::<Vec<_>>()
                         .join(", "),
                 };
-                if channel.is_required() {
+                // Without the current there is neither inertia nor friction.
+                let is_unknown_current =
+                    channel == Channel::Current && matches!(problem, ColumnFactor::Unknown);
+                if channel.is_required() || is_unknown_current {
                     return Err(error);
                 }
                 let what = format!("{error}; it is not read");

@@ -2,13 +2,12 @@
 //! `Lageistwert [mm]`.
 
 use super::found_column::{ColumnUnit, FoundColumn};
+use super::header_unit::{HeaderUnit, split_brackets};
 use super::unit::{Channel, Unit};
 use super::vocabulary::{HeaderQuantity, WordMeaning, announces_axis, axis_name, compound, meaning};
 
 /// Maximum length of a header whose words are searched, bytes.
 const MAX_HEADER: usize = 300;
-/// Maximum number of characters of an unknown unit.
-const MAX_UNIT: usize = 8;
 
 /// Takes the position of a motor for that of its axis if the columns have no other one.
 pub(super) fn resolve_motor_positions(columns: &mut [FoundColumn]) {
@@ -19,15 +18,6 @@ pub(super) fn resolve_motor_positions(columns: &mut [FoundColumn]) {
             column.channel = Some(Channel::Position);
         }
     }
-}
-
-/// Unit in a header.
-#[derive(Debug, Clone, PartialEq)]
-enum HeaderUnit {
-    Missing,
-    Known(Unit),
-    /// Text in brackets that is neither a unit nor made of known words.
-    Unknown(String),
 }
 
 /// Facts that the words of a header state.
@@ -85,48 +75,6 @@ pub(super) fn resolve_axis_a(columns: &mut [FoundColumn]) {
             column.unit = Some(ColumnUnit::assumed(Channel::Current));
         }
     }
-}
-
-/// Splits the unit off: text in brackets, or after ` / ` or ` in `. Other text in brackets stays.
-fn split_brackets(header: &str) -> (String, HeaderUnit) {
-    let mut rest = header.trim().to_owned();
-    let mut unit = HeaderUnit::Missing;
-    for (open, close) in [('[', ']'), ('(', ')')] {
-        let Some((before, inside)) = rest.split_once(open) else { continue };
-        let Some((inside, after)) = inside.split_once(close) else { continue };
-        if let Some(found) = Unit::from_header(inside) {
-            unit = HeaderUnit::Known(found);
-        } else if is_unknown_unit(inside) {
-            if unit == HeaderUnit::Missing {
-                unit = HeaderUnit::Unknown(inside.trim().to_owned());
-            }
-        } else {
-            rest = format!("{before} {inside} {after}");
-            continue;
-        }
-        rest = format!("{before} {after}");
-    }
-    for separator in [" / ", " in ", "/"] {
-        if unit == HeaderUnit::Missing
-            && let Some((before, after)) = rest.split_once(separator)
-            && let Some(found) = Unit::from_header(after)
-        {
-            return (before.to_owned(), HeaderUnit::Known(found));
-        }
-    }
-    (rest, unit)
-}
-
-/// Returns true for one short word that is no axis, number or known word.
-fn is_unknown_unit(text: &str) -> bool {
-    let text = text.trim();
-    let word = text.to_lowercase();
-    let is_word = !text.contains(char::is_whitespace) && text.chars().any(char::is_alphabetic);
-    is_word
-        && text.chars().count() <= MAX_UNIT
-        && meaning(&word).is_none()
-        && axis_name(&word).is_none()
-        && compound(&word).is_none()
 }
 
 /// Returns the unit of the last words and their number, if the channel allows it.

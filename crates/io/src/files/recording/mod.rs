@@ -9,6 +9,7 @@ mod format;
 mod found_column;
 mod halsampler;
 mod header;
+mod header_unit;
 mod inspect;
 mod join;
 mod layout;
