@@ -187,6 +187,10 @@ fn the_position_of_a_motor_is_that_of_its_axis_without_another_one() {
     let header = "time,motor position x [mm],position x [mm],motor position y [mm]";
     assert_eq!(channels(header), ["time", "motor_position", "position", "position"]);
     assert_eq!(channels("time,Motor Lage [mm],wind_up,current"), ["time", "position", "wind_up", "current"]);
+    let header = "time,Load position X [mm],Motor position X [mm],Load X [%]";
+    assert_eq!(channels(header), ["time", "position", "motor_position", "-"]);
+    let header = "time,Load position [mm],Load velocity [mm/s],Motor load [N.m]";
+    assert_eq!(channels(header), ["time", "position", "velocity", "-"]);
 }
 
 #[test]

@@ -28,6 +28,7 @@ struct Facts {
     is_actual: bool,
     is_feedforward: bool,
     is_motor: bool,
+    is_load: bool,
     other: Option<&'static str>,
     axis: Option<String>,
     /// Letter `v` beside the name of an axis.
@@ -193,6 +194,7 @@ impl Facts {
             }
             WordMeaning::Tffws => (self.quantity, self.is_feedforward) = (Some(HeaderQuantity::Torque), true),
             WordMeaning::Motor => self.is_motor = true,
+            WordMeaning::Load => self.is_load = true,
             WordMeaning::Filler => return,
             WordMeaning::Other(what) => self.other = Some(what),
         }
@@ -205,6 +207,10 @@ impl Facts {
     fn channel(&self, unit: &HeaderUnit) -> Result<Channel, String> {
         if let Some(what) = self.other {
             return Err(format!("{}: {what}", self.quoted()));
+        }
+        let is_motion = matches!(self.quantity, Some(HeaderQuantity::Position | HeaderQuantity::Velocity));
+        if self.is_load && (self.is_motor || !is_motion) {
+            return Err(format!("{}: a load or a power", self.quoted()));
         }
         let is_length =
             matches!(unit, HeaderUnit::Known(unit) if Channel::Position.symbols().contains(&unit.symbol));

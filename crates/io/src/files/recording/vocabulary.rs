@@ -31,6 +31,8 @@ pub(super) enum WordMeaning {
     /// Torque feedforward signal.
     Tffws,
     Motor,
+    /// Load: beside a position or velocity the side of the load, otherwise a load or a power.
+    Load,
     /// Filler without a meaning of its own.
     Filler,
     /// Signal that is no channel of a recording, with its description.
@@ -38,7 +40,7 @@ pub(super) enum WordMeaning {
 }
 
 use HeaderQuantity::{Counter, Current, Position, Time, Torque, Velocity, WindUp};
-use WordMeaning::{Actual, Feedforward, Filler, Motor, Other, Psec, Setpoint, Tffws, Vffws};
+use WordMeaning::{Actual, Feedforward, Filler, Load, Motor, Other, Psec, Setpoint, Tffws, Vffws};
 
 /// Words by meaning.
 const WORDS: &[(WordMeaning, &[&str])] = &[
@@ -78,6 +80,7 @@ const WORDS: &[(WordMeaning, &[&str])] = &[
     (Vffws, &["vffws"]),
     (Tffws, &["tffws"]),
     (Motor, &["motor", "mot"]),
+    (Load, &["load"]),
     (Filler, &["wert", "value", "val"]),
     (
         Other("an error or a deviation"),
@@ -97,7 +100,7 @@ const WORDS: &[(WordMeaning, &[&str])] = &[
         ],
     ),
     (Other("an acceleration or a jerk"), &["acceleration", "acc", "accel", "beschleunigung", "jerk", "ruck"]),
-    (Other("a load or a power"), &["load", "auslastung", "power", "leistung"]),
+    (Other("a load or a power"), &["auslastung", "power", "leistung"]),
     (Other("a limit"), &["limit", "limits", "max", "maximum"]),
     (Other("a voltage"), &["voltage", "spannung"]),
     (Other("a temperature"), &["temperature", "temp", "temperatur"]),
