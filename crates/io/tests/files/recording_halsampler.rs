@@ -1,7 +1,9 @@
 //! Recordings of LinuxCNC's halsampler.
 
-use super::recording_columns::{Recorded, summary};
-use virtual_axes_io::files::RecordingFormat;
+use super::recording_columns::{Recorded, axis, summary};
+use virtual_axes_identify::recording::Finding;
+use virtual_axes_io::files::{Columns, RecordingFormat, RecordingOptions, read_recording};
+use virtual_axes_verification::fixtures::folder::TestFolder;
 
 /// Line of the manual page <https://linuxcnc.org/docs/2.9/html/man/man1/halsampler.1.html>: output for the configuration
 /// string "ffbs".
@@ -74,4 +76,34 @@ fn invalid_lines_are_rejected() {
     );
     let forced = Recorded::new("halsampler", "\n").format(RecordingFormat::Halsampler).error("x");
     assert_eq!(forced, "r: the file is empty");
+}
+
+#[test]
+fn options_of_other_formats_are_reported() {
+    let folder = TestFolder::new("recording_unused_options");
+    let findings = |content: &str, topics: &[&str]| -> Vec<Finding> {
+        let texts = ["position=#2", "time=#1", "delimiter=;", "decimal_comma=true", "skip_lines=9"];
+        let texts = if content.contains(';') { &texts[2..3] } else { &texts[..] };
+        let options = RecordingOptions {
+            columns: Columns::read(None, texts, "--column").expect("a mapping"),
+            topics: topics.iter().map(|topic| (*topic).to_owned()).collect(),
+            ..RecordingOptions::default()
+        };
+        let path = folder.file("r", content);
+        let (_, findings) = read_recording(&path, axis("x"), &options).expect("good");
+        findings.into_iter().filter(|finding| finding.code == "unused-option").collect()
+    };
+    let csv = "time;position\n0;1\n";
+    assert_eq!(findings(csv, &[]), []);
+    for (content, topics, wanted) in [
+        (
+            "0.5 1.5 \n0.75 1.75 \n",
+            &[][..],
+            "delimiter, decimal_comma, skip_lines not used: the format is halsampler",
+        ),
+        (csv, &["/mill"][..], "--topic not used: the format is csv"),
+    ] {
+        let [finding] = &findings(content, topics)[..] else { panic!("one finding") };
+        assert!(finding.what.ends_with(wanted), "{finding:?}");
+    }
 }

@@ -190,7 +190,11 @@ fn a_written_trace_is_read_back() {
     let columns = Columns::read(None, &["position=p"], "--column").expect("a mapping");
     let options = RecordingOptions { columns, ..RecordingOptions::default() };
     let (found, findings) = read_recording(&path, x(), &options).expect("good");
-    assert_eq!((found, codes(&findings)), (wanted, vec!["unused-columns"]));
+    assert_eq!((found, codes(&findings)), (wanted.clone(), vec!["unused-columns"]));
+    let columns = Columns::read(None, &["skip_lines=2", "decimal_comma=true"], "--column").expect("a format");
+    let options = RecordingOptions { columns, rate_hz: Some(1000.0), ..RecordingOptions::default() };
+    let (found, findings) = read_recording(&path, x(), &options).expect("good");
+    assert_eq!((found, codes(&findings)), (wanted, vec!["unused-rate", "unused-option"]));
 }
 
 #[test]

@@ -249,6 +249,16 @@ impl Columns {
         Some(format!("{}{separator}{}={}", mapping.at, mapping.channel, shortened(&mapping.text)))
     }
 
+    /// Returns the keys of the CSV format that are set.
+    pub(super) fn format_keys(&self) -> Vec<&'static str> {
+        let keys = [
+            (DELIMITER, self.delimiter.is_some()),
+            (DECIMAL_COMMA, self.decimal_comma),
+            (SKIP_LINES, self.skip_lines > 0),
+        ];
+        keys.into_iter().filter(|(_, is_set)| *is_set).map(|(key, _)| key).collect()
+    }
+
     /// Returns the mapping of a channel, if set.
     pub(super) fn mapping(&self, channel: Channel) -> Option<&Mapping> {
         self.mappings.iter().find(|mapping| mapping.channel == channel)

@@ -115,13 +115,13 @@ pub fn read_recording(
     let format = options.format.unwrap_or_else(|| RecordingFormat::detect(&head));
     if format == RecordingFormat::Mcap {
         let (recording, mut findings) = read_recording_mcap(file, &name, axis, options)?;
-        if !options.columns.mappings.is_empty() {
-            let what = format!("{name}: the column mapping is ignored for MCAP");
-            findings.push(Finding::note("unused-columns", what));
-        }
+        findings.extend(unused_options(&name, format, options));
         return Ok((recording, findings));
     }
-    let read = read_stream(head, file, &name, axis, options);
+    let read = read_stream(head, file, &name, axis, options).map(|(recording, mut findings)| {
+        findings.extend(unused_options(&name, format, options));
+        (recording, findings)
+    });
     if format != RecordingFormat::Csv {
         return read;
     }
@@ -129,6 +129,29 @@ pub fn read_recording(
         Some(kind) => AxisRecordingError::OtherKind { at: name.clone(), kind },
         None => error,
     })
+}
+
+/// Returns findings about the options that the format does not use.
+fn unused_options(name: &str, format: RecordingFormat, options: &RecordingOptions) -> Vec<Finding> {
+    let is_mcap = format == RecordingFormat::Mcap;
+    let mut findings = Vec::new();
+    if is_mcap && !options.columns.mappings.is_empty() {
+        let what = format!("{name}: the column mapping is ignored for MCAP");
+        findings.push(Finding::note("unused-columns", what));
+    }
+    if is_mcap && options.rate_hz.is_some() {
+        let what = format!("{name}: --rate-hz is not used: the time is that of the messages");
+        findings.push(Finding::note("unused-rate", what));
+    }
+    let mut unused = if format == RecordingFormat::Csv { Vec::new() } else { options.columns.format_keys() };
+    if !is_mcap && !options.topics.is_empty() {
+        unused.push("--topic");
+    }
+    if !unused.is_empty() {
+        let what = format!("{name}: {} not used: the format is {format}", unused.join(", "));
+        findings.push(Finding::note("unused-option", what));
+    }
+    findings
 }
 
 /// Reads the recording of one axis from a stream of any format but MCAP. `name` is the file name in errors.
