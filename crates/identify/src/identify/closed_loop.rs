@@ -20,6 +20,9 @@ const AT_REST: f64 = 0.1;
 /// Largest motion at rest during that time, m and rad: a few encoder increments.
 const RESTING: f64 = 5e-6;
 const RESTING_ANGLE: f64 = 5e-3 * DEGREE;
+/// Largest change of PSEC at rest, m and rad: noise and rounding of the recorded setpoints.
+const STILL: f64 = 1e-7;
+const STILL_ANGLE: f64 = 1e-4 * DEGREE;
 
 /// Section of a recording that starts at rest and can be simulated.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,14 +96,14 @@ pub fn find_experiments(
         return trace_experiments(signals, recording, periods, mode, 0.0);
     }
     let mut found = Vec::new();
-    let resting = match axis.kind() {
-        AxisKind::Linear => RESTING,
-        AxisKind::Rotary => RESTING_ANGLE,
+    let (resting, still) = match axis.kind() {
+        AxisKind::Linear => (RESTING, STILL),
+        AxisKind::Rotary => (RESTING_ANGLE, STILL_ANGLE),
     };
     let instants = (AT_REST / tsp).ceil() as usize;
     for (number, span) in signals.spans.iter().enumerate() {
         let Some(setpoints) = SetpointGrid::of(span, signals.period, tsp) else { continue };
-        for (mode, part) in split_by_feedforward(span, &setpoints, signals.period, tsp, mode) {
+        for (mode, part) in split_by_feedforward(span, &setpoints, (signals.period, tsp, still), mode) {
             let (psec, end) = (&setpoints.values[part.clone()], part.end);
             let sample_of = |instant: usize| {
                 let time = setpoints.first + instant as f64 * tsp;
@@ -108,7 +111,8 @@ pub fn find_experiments(
             };
             let position =
                 |k: usize| span.position.get(sample_of(part.start + k)).copied().unwrap_or(f64::NAN);
-            let Some(begin) = find_rest(psec, instants, resting, position).map(|k| part.start + k) else {
+            let Some(begin) = find_rest(psec, instants, (still, resting), position).map(|k| part.start + k)
+            else {
                 continue;
             };
             let sample = sample_of(begin);
@@ -134,12 +138,12 @@ pub fn find_experiments(
     found
 }
 
-/// Splits the position cycles of a span by feedforward mode, at the standstill before a change.
+/// Splits the position cycles of a span by feedforward mode, at the standstill before a change. `period` and `tsp` are
+/// the sampling period and the position cycle, s, `still` is the largest change of PSEC at rest.
 fn split_by_feedforward(
     span: &SignalSpan,
     setpoints: &SetpointGrid,
-    period: f64,
-    tsp: f64,
+    (period, tsp, still): (f64, f64, f64),
     given: FeedforwardMode,
 ) -> Vec<(FeedforwardMode, Range<usize>)> {
     let count = setpoints.values.len();
@@ -151,7 +155,7 @@ fn split_by_feedforward(
         channel.and_then(|c| c.get(sample(from).min(end)..end)).is_some_and(|c| c.iter().any(|v| *v != 0.0))
     };
     let mut found: Vec<(FeedforwardMode, Range<usize>)> = Vec::new();
-    for (from, to) in find_moves(&setpoints.values, instants) {
+    for (from, to) in find_moves(&setpoints.values, instants, still) {
         // The delays keep the feedforward active for some time after the setpoints.
         let to = (to + instants).min(count);
         let mode = match (acts(Some(velocity), from, to), acts(span.torque_feedforward.as_ref(), from, to)) {
@@ -177,11 +181,12 @@ fn split_by_feedforward(
     found
 }
 
-/// Returns start and end of each move of PSEC; pauses shorter than `rest` cycles belong to a move.
-fn find_moves(psec: &[f64], rest: usize) -> Vec<(usize, usize)> {
+/// Returns start and end of each move of PSEC, which changes by more than `still` per cycle; pauses shorter than `rest`
+/// cycles belong to a move.
+fn find_moves(psec: &[f64], rest: usize, still: f64) -> Vec<(usize, usize)> {
     let mut found: Vec<(usize, usize)> = Vec::new();
     for (k, pair) in psec.windows(2).enumerate() {
-        if pair[0] == pair[1] {
+        if (pair[1] - pair[0]).abs() <= still {
             continue;
         }
         match found.last_mut() {
@@ -192,14 +197,22 @@ fn find_moves(psec: &[f64], rest: usize) -> Vec<(usize, usize)> {
     found
 }
 
-/// Returns the first position cycle from which PSEC and position are constant for `count` cycles.
-fn find_rest(psec: &[f64], count: usize, resting: f64, position: impl Fn(usize) -> f64) -> Option<usize> {
+/// Returns the first position cycle from which PSEC varies by at most `still`, and the position by `resting`, for `count`
+/// cycles.
+fn find_rest(
+    psec: &[f64],
+    count: usize,
+    (still, resting): (f64, f64),
+    position: impl Fn(usize) -> f64,
+) -> Option<usize> {
+    let range = |window: &[f64]| {
+        let (low, high) =
+            window.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        high - low
+    };
     let stands = |k: usize| (position(k + count.saturating_sub(1)) - position(k)).abs() <= resting;
     let windows = psec.windows(count.max(1)).enumerate();
-    windows
-        .filter(|(_, window)| window.iter().all(|value| *value == window[0]))
-        .map(|(k, _)| k)
-        .find(|k| stands(*k))
+    windows.filter(|(_, window)| range(window) <= still).map(|(k, _)| k).find(|k| stands(*k))
 }
 
 /// Simulates an axis on an experiment.

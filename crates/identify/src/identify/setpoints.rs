@@ -2,7 +2,7 @@
 
 use crate::recording::SignalSpan;
 
-/// Share of PSEC changes on one phase above which PSEC is zero-order-held.
+/// Share of the travel of PSEC on one phase above which PSEC is zero-order-held.
 const STAIRCASE: f64 = 0.9;
 /// Tolerance of an integer ratio of two periods.
 const COMMENSURATE: f64 = 1e-4;
@@ -36,18 +36,16 @@ pub(super) fn stride(period: f64, tsp: f64) -> Option<usize> {
     (whole >= 1.0 && (ratio - whole).abs() < COMMENSURATE * whole).then_some(whole as usize)
 }
 
-/// Returns the sample, among the first `stride`, at which zero-order-held setpoints change; 0 without a hold.
+/// Returns the sample, among the first `stride`, at which zero-order-held setpoints change; 0 without a hold. Steps count
+/// by their size, so that noise does not hide the hold.
 fn phase(psec: &[f64], stride: usize) -> usize {
-    let mut changes = vec![0_usize; stride];
+    let mut travel = vec![0.0; stride];
     for (i, pair) in psec.windows(2).enumerate() {
-        if pair[0] != pair[1] {
-            changes[(i + 1) % stride] += 1;
-        }
+        travel[(i + 1) % stride] += (pair[1] - pair[0]).abs();
     }
-    let all: usize = changes.iter().sum();
-    let most = changes.iter().enumerate().max_by_key(|(_, count)| **count);
-    most.filter(|(_, count)| **count as f64 >= STAIRCASE * all as f64 && all > 0)
-        .map_or(0, |(phase, _)| phase)
+    let all: f64 = travel.iter().sum();
+    let most = travel.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+    most.filter(|(_, part)| **part >= STAIRCASE * all && all > 0.0).map_or(0, |(phase, _)| phase)
 }
 
 #[cfg(test)]
@@ -62,6 +60,15 @@ mod tests {
         let found = SetpointGrid::of(&span, 1e-3, 6e-3).expect("a grid");
         assert!((found.first - 2e-3).abs() < 1e-12);
         assert_eq!(found.values[..4], [1.0, 2.0, 3.0, 4.0]);
+    }
+
+    #[test]
+    fn noise_does_not_hide_the_hold_of_setpoints() {
+        let noise = |i: i32| 1e-3 * f64::from(i * 7 % 11);
+        let psec: Vec<f64> = (0..60).map(|i| f64::from((i + 4) / 6) + noise(i)).collect();
+        let span = SignalSpan { psec: Some(psec), ..SignalSpan::default() };
+        let found = SetpointGrid::of(&span, 1e-3, 6e-3).expect("a grid");
+        assert!((found.first - 2e-3).abs() < 1e-12);
     }
 
     #[test]
