@@ -256,11 +256,16 @@ fn identify(
     let (axis, periods) = (&config.axes()[index], config.periods());
     let (files, others) = (&arguments.recordings, &arguments.validate);
     let modes = recordings::feedforward(&arguments.feedforward, files.len(), "--feedforward")?;
-    let for_others = match (arguments.validate_feedforward.as_slice(), arguments.feedforward.as_slice()) {
-        ([], [one]) => std::slice::from_ref(one),
-        (given, _) => given,
+    let other_modes = match modes.as_slice() {
+        [first, rest @ ..]
+            if arguments.validate_feedforward.is_empty() && rest.iter().all(|m| m == first) =>
+        {
+            vec![*first; others.len()]
+        }
+        _ => {
+            recordings::feedforward(&arguments.validate_feedforward, others.len(), "--validate-feedforward")?
+        }
     };
-    let other_modes = recordings::feedforward(for_others, others.len(), "--validate-feedforward")?;
     // A lag of the current cannot be told from presliding.
     let reading = match arguments.presliding {
         true => arguments.reading.clone().without_estimated_current_lag(),

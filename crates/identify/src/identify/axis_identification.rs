@@ -165,6 +165,43 @@ pub struct AxisValidation {
     pub agreement: Agreement,
 }
 
+impl AxisValidation {
+    /// Compares the identified axis with the recording. Unknown feedforward of a production trace is the one with the
+    /// smaller residual.
+    fn new(
+        mut recorded: ConditionedRecording,
+        axis: &AxisConfig,
+        periods: &Periods,
+    ) -> Result<Self, AxisIdentificationError> {
+        let is_unknown =
+            recorded.feedforward.is_none() && are_production_traces(&[recorded.input()], axis, periods);
+        if !is_unknown {
+            let agreement = validate(&recorded.input(), axis, periods)?;
+            return Ok(AxisValidation { recorded, agreement });
+        }
+        let mut tried = Vec::new();
+        for mode in [FeedforwardMode::Off, FeedforwardMode::Velocity, FeedforwardMode::Both] {
+            recorded.feedforward = Some(mode);
+            let agreement = validate(&recorded.input(), axis, periods)?;
+            let residual = agreement.baseline.as_ref().map_or(f64::INFINITY, |baseline| baseline.model);
+            tried.push((mode, residual, agreement));
+        }
+        tried.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((mode, _, agreement)) = tried.into_iter().next() else {
+            let agreement = validate(&recorded.input(), axis, periods)?;
+            return Ok(AxisValidation { recorded, agreement });
+        };
+        recorded.feedforward = Some(mode);
+        let what = format!(
+            "{}: feedforward {} is assumed: the identified axis deviates least with it",
+            recorded.signals.name,
+            mode.name()
+        );
+        recorded.findings.push(Finding::note("feedforward-inferred", what));
+        Ok(AxisValidation { recorded, agreement })
+    }
+}
+
 /// Recordings of an axis by their use.
 #[derive(Debug, Default)]
 pub struct AxisRecordings {
@@ -245,11 +282,12 @@ impl AxisIdentification {
         start(&format!("validating {}", axis.name()))?;
         let validations = others.into_iter().map(|mut recorded| {
             recorded.feedforward = recorded.feedforward.or(identification.inferred_feedforward);
-            let agreement = validate(&recorded.input(), &updated.axes()[index], &updated.periods())?;
-            Ok(AxisValidation { recorded, agreement })
+            AxisValidation::new(recorded, &updated.axes()[index], &updated.periods())
         });
         let validations: Vec<AxisValidation> = validations.collect::<Result<_, AxisIdentificationError>>()?;
         for AxisValidation { recorded, agreement } in &validations {
+            let inferred = recorded.findings.iter().filter(|finding| !findings.contains(finding));
+            findings.extend(inferred.cloned().collect::<Vec<_>>());
             findings.extend(invalid_agreement(&recorded.signals.name, agreement, &updated.axes()[index]));
         }
         findings.sort_by_key(|finding| Reverse(finding.severity));

@@ -89,13 +89,14 @@ pub(super) fn identify_production(
         false => FeedforwardMode::Velocity,
     };
     let mut best = fit_loop(&given(active), periods, scope, &found.axis).map(|fit| (active, fit));
-    if inputs.iter().any(|input| input.feedforward.is_none()) {
+    let is_inferred = inputs.iter().any(|input| input.feedforward.is_none());
+    if is_inferred {
         let without = fit_loop(&given(FeedforwardMode::Off), periods, scope, &found.axis);
         best = infer_feedforward(best, without.map(|fit| (FeedforwardMode::Off, fit)), found);
     }
     match best {
         Some((mode, fit)) => {
-            found.inferred_feedforward = Some(mode);
+            found.inferred_feedforward = is_inferred.then_some(mode);
             apply_loop(&fit, found);
         }
         None => found.findings.push(Finding::missing(
