@@ -141,6 +141,44 @@ fn all_axes_are_identified_with_one_position_cycle() {
 }
 
 #[test]
+fn traces_without_feedforward_show_neither_its_weights_nor_its_delays() {
+    let folder = TestFolder::new("identify_off");
+    let file = |name: &str| folder.0.join(name).to_string_lossy().into_owned();
+    let (program, off, both) = (file("moves.yaml"), file("off.csv"), file("both.csv"));
+    std::fs::write(&program, TWO_AXES).expect("a program");
+    let record = |trace: &str, set: &[&str]| {
+        let run = ["run", &program, "--trace", trace, "--trace-period", "20ms", "--quiet"];
+        printed(&[run.as_slice(), set].concat());
+    };
+    record(&off, &["--set", "x.feedforward.velocity=0", "--set", "x.feedforward.torque_kg_m2=0"]);
+    record(&both, &[]);
+    let two = ["identify", &off, &off, "--axis", "x", "--feedforward", "off,off"];
+    let of = |validated: &str| -> serde_json::Value {
+        json(&[two.as_slice(), &REFINE, &["--validate", validated, "--json"]].concat())
+    };
+    let model =
+        |found: &serde_json::Value, of: &str| found[of][0]["baseline"]["model"].as_f64().expect("a number");
+    let found = of(&off);
+    // The machine file has rounded values.
+    assert!((model(&found, "validation") / model(&found, "agreement") - 1.0).abs() < 1e-3, "{found}");
+    let is_key = |key: &str| {
+        let values = found["values"].as_array().into_iter().flatten();
+        values.filter_map(|value| value["key"].as_str()).any(|known| known.contains(key))
+    };
+    assert!(is_key("delays.alpha_ms") && !is_key("feedforward") && !is_key("beta") && !is_key("gamma"));
+    let text = printed(&[two.as_slice(), &REFINE].concat());
+    assert!(text.contains("note: VFFW, TFFW, β and γ are unchanged"), "{text}");
+    for part in ["NaN", "VFFW and α", "with feedforward\n", "β and γ are counted"] {
+        assert!(!text.contains(part), "{part:?} in {text}");
+    }
+    // The feedforward of a validation recording is inferred if the recordings differ in theirs.
+    let mixed = ["identify", &off, &both, "--axis", "x", "--feedforward", "off,both"];
+    let found = json(&[mixed.as_slice(), &REFINE, &["--validate", &off, "--json"]].concat());
+    assert_eq!(found["validation"][0]["feedforward"], serde_json::json!(["off"]));
+    assert!(model(&found, "validation") < 1.5 * model(&found, "agreement"), "{found}");
+}
+
+#[test]
 fn an_invalid_result_is_printed_but_not_written() {
     let (files, folder) = (&*FILES, TestFolder::new("identify_invalid"));
     let out = folder.0.join("identified.yaml").to_string_lossy().into_owned();

@@ -87,13 +87,22 @@ impl LoopProblem<'_> {
         all.flat_map(|(k, (signals, mode))| trace_experiments(signals, k, periods, *mode, shift)).collect()
     }
 
+    /// Returns true if a recording has the feedforward `mode`, or more.
+    fn has(&self, mode: FeedforwardMode) -> bool {
+        self.recordings.iter().any(|(_, active)| *active >= mode)
+    }
+
+    /// Returns true if the velocity feedforward has an effect on a recording.
+    fn has_velocity_feedforward(&self, axis: &AxisConfig) -> bool {
+        self.has(FeedforwardMode::Velocity) && axis.feedforward.velocity != 0.0
+    }
+
     fn parameters(&self, axis: &AxisConfig) -> Vec<LoopParameter> {
-        let has = |mode| self.recordings.iter().any(|(_, active)| *active >= mode);
         let mut parameters = vec![LoopParameter::Lag];
-        if has(FeedforwardMode::Velocity) && axis.feedforward.velocity != 0.0 {
+        if self.has_velocity_feedforward(axis) {
             parameters.push(LoopParameter::Beta);
         }
-        if has(FeedforwardMode::Both) && axis.feedforward.torque != 0.0 {
+        if self.has(FeedforwardMode::Both) && axis.feedforward.torque != 0.0 {
             parameters.extend([LoopParameter::Gamma, LoopParameter::TorqueRatio]);
         }
         if self.fits_gain {
@@ -236,7 +245,7 @@ impl LoopProblem<'_> {
         let tsp = seconds(periods.position);
         let cycles = (free.values[0] / tsp).round().max(0.0);
         let mut between = axis.clone();
-        if !divides(periods.position, free.values[0]) && axis.feedforward.velocity != 0.0 {
+        if !divides(periods.position, free.values[0]) && self.has_velocity_feedforward(axis) {
             // The lag is α + (1 − VFFW) / Kp: VFFW represents what is left of it between two cycles.
             let gain = parameters.iter().zip(&free.values).find(|(p, _)| **p == LoopParameter::Gain);
             let gain = gain.map_or(self.given_gain, |(_, value)| *value);
@@ -336,7 +345,7 @@ impl LoopProblem<'_> {
     /// The lag at constant velocity is α + (1 − VFFW) / Kp, so both compensate each other.
     fn valley(&self, axis: &AxisConfig, periods: &Periods, lag: f64) -> Option<[(f64, f64); 2]> {
         let weight = axis.feedforward.velocity;
-        if weight == 0.0 {
+        if !self.has_velocity_feedforward(axis) {
             return None;
         }
         let lags = |x: &[f64]| {

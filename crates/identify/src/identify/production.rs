@@ -316,14 +316,21 @@ fn nanoseconds(time: f64) -> Nanoseconds {
 /// Reports the position cycle, the valley of VFFW and α, and a gain that does not fit.
 fn report_loop(fit: &LoopFit, before: &AxisConfig, found: &mut Identification) {
     let tsp = seconds(fit.periods.position) / MILLISECOND;
-    found.findings.push(Finding::note(
-        "position-cycle",
-        format!(
-            "β and γ are counted with a position cycle of {} ms: a trace shows the sum of β and the cycle, so that β of a \
-             control with another cycle is shorter or longer by the difference",
-            Rounded(tsp)
+    let is_fitted = |parameter| fit.values.iter().any(|value| value.parameter == parameter);
+    found.findings.push(match is_fitted(LoopParameter::Beta) {
+        true => Finding::note(
+            "position-cycle",
+            format!(
+                "β and γ are counted with a position cycle of {} ms: a trace shows the sum of β and the cycle, so that β of \
+                 a control with another cycle is shorter or longer by the difference",
+                Rounded(tsp)
+            ),
         ),
-    ));
+        false => Finding::note(
+            "unseen-delay",
+            "VFFW, TFFW, β and γ are unchanged: no recording with feedforward shows them",
+        ),
+    });
     if let Some([low, high]) = fit.valley {
         found.findings.push(Finding::note(
             "valley",

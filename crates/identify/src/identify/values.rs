@@ -278,7 +278,11 @@ impl Identification {
         for fit in &self.delays {
             let left = if fit.is_unchanged { "; unchanged" } else { "" };
             let source = match fit.is_joint {
-                true => "jointly from positions, with feedforward".to_owned(),
+                // β is fitted with feedforward only.
+                true if self.delays.iter().any(|fit| fit.delay == DelayParameter::Beta) => {
+                    "jointly from positions, with feedforward".to_owned()
+                }
+                true => "jointly from positions, without feedforward".to_owned(),
                 false => format!("feedforward {}{left}", fit.delay.feedforward_mode().name()),
             };
             let key = match fit.delay {
