@@ -35,3 +35,20 @@ fn the_signals_of_one_axis_are_rejected_for_all_axes() {
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(!message.contains("names the signals of one axis"), "{message}");
 }
+
+#[test]
+fn options_without_effect_on_the_list_of_columns_are_rejected() {
+    let folder = TestFolder::new("identify_list");
+    let recording = folder.file("two.csv", &two_axes()).to_string_lossy().into_owned();
+    let rejected = |more: &[&str], options: &str| {
+        let expected = format!("{options}: no effect without --axis");
+        assert_rejected(&[&["identify", recording.as_str()], more].concat(), &[&expected]);
+    };
+    rejected(&["--json", "--out", "new.yaml"], "--json, --out");
+    rejected(&["--csv"], "--csv");
+    rejected(&["--quiet", "--report", "page.html"], "--quiet, --report");
+    rejected(&["--feedforward", "off", "--no-refine"], "--feedforward, --no-refine");
+    rejected(&["--validate", &recording, "--presliding", "--free-i0"], "--free-i0, --presliding, --validate");
+    rejected(&["--refine", "inertia"], "--refine");
+    assert!(run(&["identify", &recording]).status.success());
+}

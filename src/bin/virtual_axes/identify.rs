@@ -117,6 +117,7 @@ impl IdentifyArguments {
 
 /// Runs the command and returns tables or JSON.
 pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
+    check_listing(arguments)?;
     check_outputs(arguments)?;
     let machine = Parameters::load(&arguments.machine)?;
     let parameters = variant::parameters(&machine, None, &arguments.set, &[])?;
@@ -195,6 +196,32 @@ fn joined(
         (OutputFormat::Text, _) => texts.join("\n"),
         _ => texts.concat(),
     })
+}
+
+/// Rejects options without effect on the list of columns.
+fn check_listing(arguments: &IdentifyArguments) -> Result<(), String> {
+    let format = arguments.output.format();
+    let options = [
+        ("--json", format == OutputFormat::Json),
+        ("--csv", format == OutputFormat::Csv),
+        ("--quiet", format == OutputFormat::Quiet),
+        ("--out", arguments.out.is_some()),
+        ("--report", arguments.report.is_some()),
+        ("--feedforward", !arguments.feedforward.is_empty()),
+        ("--free-i0", arguments.free_i0),
+        ("--refine", !arguments.refine.is_empty()),
+        ("--no-refine", arguments.no_refine),
+        ("--presliding", arguments.presliding),
+        ("--validate", !arguments.validate.is_empty()),
+    ];
+    let given: Vec<&str> = options.iter().filter(|(_, is_given)| *is_given).map(|(name, _)| *name).collect();
+    match (&arguments.axis, given.as_slice()) {
+        (Some(_), _) | (None, []) => Ok(()),
+        (None, given) => Err(format!(
+            "{}: no effect without --axis, which lists the columns only; give --axis NAME or --axis all",
+            given.join(", ")
+        )),
+    }
 }
 
 /// Rejects invalid output files before the identification starts.
