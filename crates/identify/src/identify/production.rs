@@ -20,7 +20,9 @@ use super::validate::constant_lag;
 use crate::recording::{Finding, Signals};
 use virtual_axes_core::config::{AxisConfig, AxisKind, Periods, PositionControllerConfig};
 use virtual_axes_core::statistics::mean;
-use virtual_axes_core::units::{MICROSECOND_NS, MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, seconds};
+use virtual_axes_core::units::{
+    DEGREE, MICROSECOND_NS, MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, seconds,
+};
 
 /// Travel of an axis that moves, m or rad.
 const SHORTEST_TRAVEL: f64 = 1e-3;
@@ -183,7 +185,7 @@ fn report_interpolation(inputs: &[IdentificationInput<'_>], found: &mut Identifi
 fn position_unit(axis: &AxisConfig) -> (f64, &'static str) {
     match axis.kind() {
         AxisKind::Linear => (1e-6, "µm"),
-        AxisKind::Rotary => (1e-3 * virtual_axes_core::units::DEGREE, "mdeg"),
+        AxisKind::Rotary => (1e-3 * DEGREE, "mdeg"),
     }
 }
 
@@ -203,6 +205,15 @@ fn apply_plant(plant: PlantRegression, found: &mut Identification) {
     let gravity = significant_gravity(plant.gravity, &plant.friction.law.config);
     if let (Some((weight, _)), AxisKind::Linear) = (gravity.weight, axis.kind()) {
         axis.gravity.weight = if gravity.model == GravityCurrent::default() { 0.0 } else { weight };
+    }
+    if axis.kind() == AxisKind::Rotary {
+        let what = format!(
+            "gravity.tilt_nm {} and gravity.tilt_phase_deg {} are those of the machine file: gravity of a rotary axis is \
+             identified from a campaign only",
+            Rounded(axis.gravity.tilt),
+            Rounded(axis.gravity.phase / DEGREE)
+        );
+        found.findings.push(Finding::note("gravity-kept", what));
     }
     found.gravity = Some(gravity);
     found.inertia = Some(plant.inertia);
