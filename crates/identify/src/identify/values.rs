@@ -221,22 +221,34 @@ impl Identification {
             });
             put(&["gravity.weight_n"], self.axis.gravity.weight, refined, interval, source);
         }
-        if let Some((_, error)) = gravity.tilt
-            && let Some((error, source)) =
-                self.error_and_source(RefinedParameter::TiltSine, Some(error), source)
-        {
-            put(&["gravity.tilt_nm"], self.axis.gravity.tilt, error, None, source);
+        let refined = self.errors_of_tilt();
+        let source = || match refined {
+            Some(_) => format!("{}; refined on the closed loop", source()),
+            None => source(),
+        };
+        if let Some((_, error)) = gravity.tilt {
+            let error = refined.map_or(error, |errors| errors[0]);
+            put(&["gravity.tilt_nm"], self.axis.gravity.tilt, Some(error), None, source());
         }
         if let Some((_, error)) = gravity.phase {
-            let degrees = |angle: f64| angle / DEGREE;
-            put(
-                &["gravity.tilt_phase_deg"],
-                degrees(self.axis.gravity.phase),
-                Some(degrees(error)),
-                None,
-                source(),
-            );
+            let error = refined.map_or(error, |errors| errors[1]) / DEGREE;
+            put(&["gravity.tilt_phase_deg"], self.axis.gravity.phase / DEGREE, Some(error), None, source());
         }
+    }
+
+    /// Returns the standard errors of the tilting torque k, N·m, and its phase φ, rad, from those of k cos φ and k sin φ in
+    /// the refinement.
+    fn errors_of_tilt(&self) -> Option<[f64; 2]> {
+        let refinement = self.refinement.as_ref()?;
+        let index = |parameter| refinement.parameters.iter().position(|p| p.parameter == parameter);
+        let (s, c) = (index(RefinedParameter::TiltSine)?, index(RefinedParameter::TiltCosine)?);
+        let (x, y) = (refinement.parameters[s].error, refinement.parameters[c].error);
+        let covariance = refinement.correlations.get(s)?.get(c)? * x * y;
+        let (sin, cos) = self.axis.gravity.phase.sin_cos();
+        let along = (cos * x).powi(2) + (sin * y).powi(2) + 2.0 * sin * cos * covariance;
+        let across = (sin * x).powi(2) + (cos * y).powi(2) - 2.0 * sin * cos * covariance;
+        let [along, across] = [along, across].map(|square| square.max(0.0).sqrt());
+        Some([along, across / self.axis.gravity.tilt.abs()])
     }
 
     fn push_control(&self, put: &mut ValueSink<'_>) {
