@@ -10,10 +10,11 @@ use super::inertia::fit_inertia;
 use super::options::IdentificationInput;
 use super::refine::RefinedParameter;
 use super::segments::{MotionSegment, find_segments};
+use super::validate::Agreement;
 use crate::recording::{Finding, GaussianFilter, SignalSpan, Signals};
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_core::statistics::median;
-use virtual_axes_core::units::DEGREE;
+use virtual_axes_core::units::{DEGREE, MILLISECOND};
 
 /// Largest relative difference between refined and measured friction.
 const DISAGREEING: f64 = 0.05;
@@ -26,6 +27,8 @@ const BACKLASH_ANGLE: f64 = 2.5e-3 * DEGREE;
 /// Sampling period, relative to the position cycle, above which the current between setpoints is not
 /// resolved: at a third of it the inertia by eq. 5 is up to 6 % too small.
 const COARSE: f64 = 0.3;
+/// Share of the squared position residual that a constant time shift explains, from which on it is reported.
+const SHIFTED: f64 = 0.9;
 /// Largest relative difference between eq. 5 and the refined inertia without a finding.
 const UNSEEN: f64 = 0.03;
 
@@ -182,10 +185,43 @@ fn report_positions(inputs: &[IdentificationInput<'_>], found: &mut Identificati
                     worst / unit
                 ),
                 "check position_loop.gain, the other gains and the periods of the machine file, the active \
-                 feedforward, and that PSEC and position have the same zero",
+                 feedforward, that PSEC and position have the same zero, and that all signals are sampled at the position \
+                 cycles",
             ));
+            if found.periods.is_none() {
+                report_sampling_phase(&input.signals.name, agreement, &mut found.findings);
+            }
         }
     }
+}
+
+/// Returns the time, s, by which the simulated position is ahead of the recorded one; none if no constant time explains
+/// their difference.
+fn time_shift(agreement: &Agreement) -> Option<f64> {
+    let pairs = agreement.experiments.iter().zip(&agreement.simulated).flat_map(|(recorded, simulated)| {
+        let residuals = simulated.position.iter().zip(&recorded.position).map(|(s, r)| s - r);
+        residuals.zip(recorded.velocity.iter().copied())
+    });
+    let (residual, product, velocity) = pairs
+        .filter(|(residual, velocity)| residual.is_finite() && velocity.is_finite())
+        .fold((0.0, 0.0, 0.0), |(rr, rv, vv), (r, v)| (rr + r * r, rv + r * v, vv + v * v));
+    (product * product > SHIFTED * residual * velocity).then(|| product / velocity)
+}
+
+/// Reports samples that seem to lie beside the position cycles, or none.
+fn report_sampling_phase(name: &str, agreement: &Agreement, findings: &mut Vec<Finding>) {
+    let Some(shift) = time_shift(agreement) else { return };
+    findings.push(Finding::warning(
+        "sampling-phase",
+        format!(
+            "{name}: the position deviates as if it were sampled {:.2} ms {} the position cycles: at that phase the current \
+             is another one than simulated, and inertia and friction are wrong",
+            shift.abs() / MILLISECOND,
+            if shift > 0.0 { "before" } else { "after" }
+        ),
+        "sample PSEC, position and current at the position cycles or every millisecond; a wrong position_loop.gain has the \
+         same effect on the position",
+    ));
 }
 
 /// Reports an inertia by eq. 5 that misses a part of the current.
