@@ -267,7 +267,7 @@ fn invalid_input_is_rejected_with_its_name() {
     rejected(&["--column", "positon=x"], &["--column: unknown key \"positon\"", "nearest is position"]);
     rejected(&["--columns", &map], &["off.csv: "]);
     rejected(&["--cutoff-hz", "1000"], &["off.csv: cut-off 1000 Hz"]);
-    rejected(&["--current-lag-ms", "50"], &["off.csv: current lag 0.05 s"]);
+    rejected(&["--current-lag-ms", "50"], &["off.csv: --current-lag-ms is 50, must be -10 … 20"]);
     // Lists.
     let (validate, two) = (["--validate", recordings.both.as_str()], ["--validate-feedforward", "off,both"]);
     rejected(&[validate, two].concat(), &["--validate-feedforward: 2 values for 1 recording;"]);

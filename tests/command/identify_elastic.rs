@@ -95,6 +95,10 @@ fn axes_at_rest_in_all_recordings_are_left_out() {
     let found = json(&[all.as_slice(), &["--json"]].concat());
     let found = found.as_array().expect("a list");
     assert_eq!(found.iter().map(|axis| &axis["axis"]).collect::<Vec<_>>(), ["x"]);
+    let resting = found[0]["findings"].as_array().into_iter().flatten().find(|f| f["code"] == "at-rest");
+    assert_eq!(resting.expect("a finding")["text"], "at rest, not identified: y, z, a, c");
+    let quiet = printed(&[all.as_slice(), &["--quiet"]].concat());
+    assert!(quiet.ends_with("warnings\nat rest, not identified: y, z, a, c\n"), "{quiet}");
     let still = folder.file("still.csv", "time,x\n0,0\n1,0\n").to_string_lossy().into_owned();
     printed(&["run", &still, "--quiet", "--trace", &trace]);
     assert_rejected(&all, &["--axis all: no axis moves in the recordings (x, y, z, a, c)"]);

@@ -82,6 +82,9 @@ fn invalid_arguments_are_rejected_with_what_is_allowed() {
     rejected(&["--iterations", "0"], &["1..=1000"]);
     rejected(&["--encoder-step", "-1"], &["must be in 0 … 1000"]);
     rejected(&["--on", "periods.position_ms=3"], &["must not change joints or periods"]);
+    rejected(&["--on", "q.foo=1"], &["--on: unknown parameter q.foo"]);
+    let divided = "x.position_loop.controller=rst,x.position_loop.rst.r=[0],x.position_loop.rst.s=[0],x.position_loop.rst.t=[0]";
+    rejected(&["--on", divided], &["--controller, --set or --on: axis x: position_loop: s[0] = 0"]);
     rejected(&["--report", "x.txt"], &["its extension must be .html or .htm"]);
     let program =
         ["learn", "s-path-five-axis", "--controller", "gpc", "--gain", "0.8", "--acceleration-excess", "0"];

@@ -153,7 +153,11 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
         }
         AxesResult { summaries: vec![found.summary], failures: Vec::new(), identified: found.identified }
     };
-    let AxesResult { summaries, failures, identified } = found;
+    let AxesResult { mut summaries, failures, identified } = found;
+    if !resting.is_empty() && arguments.output.format() == OutputFormat::Json {
+        let finding = axes::at_rest(&resting);
+        summaries.iter_mut().for_each(|summary| summary.findings.push(finding.clone()));
+    }
     let mut texts: Vec<String> = summaries.iter().map(|summary| output(arguments, summary)).collect();
     if let Some(reason) = InvalidResult::reason(&summaries, &failures) {
         drop(spinner);
@@ -163,8 +167,8 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
         machine_file::write(out, &machine_text(arguments, &summaries, &identified))?;
     }
     drop(spinner);
-    if !resting.is_empty() && arguments.output.format() == OutputFormat::Text {
-        texts.push(text_table::wrapped_line(&format!("at rest, not identified: {}", resting.join(", "))));
+    if !resting.is_empty() && matches!(arguments.output.format(), OutputFormat::Text | OutputFormat::Quiet) {
+        texts.push(text_table::wrapped_line(&axes::at_rest(&resting).what));
     }
     joined(arguments, &summaries, &texts)
 }

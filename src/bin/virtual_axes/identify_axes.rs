@@ -55,6 +55,11 @@ pub fn moving_axes(
     Ok((moving, names))
 }
 
+/// Returns the finding about the axes that do not move in the recordings.
+pub fn at_rest(names: &[String]) -> Finding {
+    Finding::note("at-rest", format!("at rest, not identified: {}", names.join(", ")))
+}
+
 /// Results of the axes of a machine.
 pub struct AxesResult {
     /// Figures of each identified axis.

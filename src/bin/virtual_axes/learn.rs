@@ -101,8 +101,15 @@ pub fn run(arguments: &LearnArguments) -> Result<String, Box<dyn Error>> {
     };
     let on = |list: &String| -> Result<(String, MachineConfig), Box<dyn Error>> {
         let changes = variant::changes(list);
-        let changed = variant::parameters(&machine, arguments.controller, &arguments.trial.set, &changes)?;
-        Ok((changes.join(", "), variant::checked(&changed, &machine, &arguments.trial.machine)?))
+        let changed = variant::changed_parameters(
+            &machine,
+            arguments.controller,
+            &arguments.trial.set,
+            ("--on", &changes),
+        )?;
+        let options = "--controller, --set or --on";
+        let config = variant::checked_with(options, &changed, &machine, &arguments.trial.machine)?;
+        Ok((changes.join(", "), config))
     };
     let others = arguments.on.iter().map(on).collect::<Result<Vec<_>, _>>()?;
     let is_other = |(_, other): &&(String, MachineConfig)| {

@@ -56,6 +56,17 @@ pub fn parameters(
     set: &[String],
     compared: &[String],
 ) -> Result<Parameters, Box<dyn Error>> {
+    changed_parameters(machine, controller, set, ("--compare", compared))
+}
+
+/// Returns the machine as [`parameters`] does, with the changes of another option, which errors name, in place of
+/// `--compare`.
+pub fn changed_parameters(
+    machine: &Parameters,
+    controller: Option<ControllerName>,
+    set: &[String],
+    (option, changes): (&str, &[String]),
+) -> Result<Parameters, Box<dyn Error>> {
     let parsed = |option: &str, texts: &[String]| -> Result<Vec<Assignment>, ConfigError> {
         let source = ValueSource::named(option);
         texts.iter().map(|text| parse_assignment(text, &source)).collect()
@@ -69,7 +80,7 @@ pub fn parameters(
     assignments.extend(set);
     let mut parameters = machine.clone();
     parameters.set_all(assignments)?;
-    parameters.set_all(parsed("--compare", compared)?)?;
+    parameters.set_all(parsed(option, changes)?)?;
     Ok(parameters)
 }
 
@@ -96,10 +107,20 @@ pub fn checked(
     machine: &Parameters,
     name: &str,
 ) -> Result<MachineConfig, Box<dyn Error>> {
+    checked_with("--controller, --set or --compare", parameters, machine, name)
+}
+
+/// Builds and validates the machine as [`checked`] does; `options` are the names of the options in errors.
+pub fn checked_with(
+    options: &str,
+    parameters: &Parameters,
+    machine: &Parameters,
+    name: &str,
+) -> Result<MachineConfig, Box<dyn Error>> {
     let config = parameters.machine_config()?;
     MachineParameters::new(&config).map_err(|error| {
         let is_file_invalid = machine.machine_config().is_ok_and(|own| MachineParameters::new(&own).is_err());
-        let source = if is_file_invalid { name } else { "--controller, --set or --compare" };
+        let source = if is_file_invalid { name } else { options };
         format!("{source}: {error}")
     })?;
     Ok(config)

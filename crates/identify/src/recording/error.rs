@@ -1,6 +1,6 @@
 //! Errors of the conditioning of a recording.
 
-use virtual_axes_core::units::Rounded;
+use virtual_axes_core::units::{MILLISECOND, Rounded};
 
 /// Error of [`condition`](super::condition()): a recording that is not plausible for the axis.
 ///
@@ -253,7 +253,11 @@ pub enum ConditioningError {
         period: f64,
     },
     /// Given current lag out of range.
-    #[error("{name}: current lag {} s, must be {lowest} … {highest} s", Rounded(*found))]
+    #[error("{name}: --current-lag-ms is {}, must be {} … {}",
+        Rounded(found / MILLISECOND),
+        Rounded(lowest / MILLISECOND),
+        Rounded(highest / MILLISECOND)
+    )]
     Lag {
         /// Name of the recording.
         name: String,
