@@ -5,7 +5,7 @@ mod closed_loop_steps;
 use super::closed_loop::{Experiment, find_experiments};
 use super::feedforward::{FeedforwardFit, fit_feedforward};
 use super::feedforward_mode::FeedforwardMode;
-use super::findings::{inertia_of_simulation, report_result};
+use super::findings::{inertia_of_simulation, report_aliased_current, report_result};
 use super::friction::{Breakaway, fit_friction};
 use super::gravity::{GravityCurrent, SteadyMeasurements, fit_gravity};
 use super::identification::Identification;
@@ -113,6 +113,8 @@ impl<'a> IdentificationSteps<'a> {
         let (inputs, periods) = (self.inputs, self.periods);
         if are_production_traces(inputs, &self.found.axis, periods) {
             identify_production(inputs, periods, self.options.refine, &mut self.found);
+            let cycle = self.found.periods.unwrap_or(*periods);
+            report_aliased_current(inputs, &cycle, &mut self.found.findings);
             self.find_production_experiments();
         } else {
             self.fit_plant();

@@ -22,7 +22,7 @@ fn law(v: f64) -> f64 {
 }
 
 /// Returns legs at each speed (m/min) from rest to rest, with the way back if `back`.
-fn legs(speeds: &[f64], back: bool) -> Vec<f64> {
+pub(crate) fn legs(speeds: &[f64], back: bool) -> Vec<f64> {
     let mut psec = vec![0.0; 100];
     for &speed in speeds {
         let v = speed / 60.0;
@@ -43,11 +43,11 @@ fn legs(speeds: &[f64], back: bool) -> Vec<f64> {
 }
 
 /// Records X without feedforward on the setpoints `psec`.
-fn recorded(parameters: &Parameters, psec: &[f64], disturbance: &Disturbance) -> RawRecording {
+pub(crate) fn recorded(parameters: &Parameters, psec: &[f64], disturbance: &Disturbance) -> RawRecording {
     record(&machine_with_feedforward(parameters, "x", FeedforwardMode::Off), "x", psec, disturbance)
 }
 
-fn clean() -> Disturbance {
+pub(crate) fn clean() -> Disturbance {
     Disturbance { resolution: 1e-6, ..Disturbance::default() }
 }
 
@@ -56,7 +56,11 @@ fn with(mut parameters: Parameters, key: &str, value: Value) -> Parameters {
     parameters
 }
 
-fn identified(raw: &[RawRecording], start: &Parameters, options: &IdentificationOptions) -> Identification {
+pub(crate) fn identified(
+    raw: &[RawRecording],
+    start: &Parameters,
+    options: &IdentificationOptions,
+) -> Identification {
     let machine = start.machine_config().expect("a machine");
     let axis = &machine.axes()[axis_index(&machine, "x")];
     let signals: Vec<_> = raw
@@ -70,11 +74,11 @@ fn identified(raw: &[RawRecording], start: &Parameters, options: &Identification
     identify(&inputs, axis, &machine.periods(), options)
 }
 
-const STEPS_ONLY: IdentificationOptions =
+pub(crate) const STEPS_ONLY: IdentificationOptions =
     IdentificationOptions { i0: Breakaway::Held, refine: RefinementScope::NONE, presliding: false };
 
 /// Returns text and remedy of the only finding with this code.
-fn finding(found: &Identification, severity: Severity, code: &str) -> String {
+pub(crate) fn finding(found: &Identification, severity: Severity, code: &str) -> String {
     let mut of_it = found.findings.iter().filter(|finding| finding.code == code);
     let finding = of_it.next().unwrap_or_else(|| panic!("no {code} in {:?}", found.findings));
     assert!(of_it.next().is_none(), "{code} is reported twice");
@@ -82,7 +86,7 @@ fn finding(found: &Identification, severity: Severity, code: &str) -> String {
     finding.to_string()
 }
 
-fn inertia_of(found: &Identification) -> f64 {
+pub(crate) fn inertia_of(found: &Identification) -> f64 {
     RefinedParameter::Inertia.get(found.axis())
 }
 

@@ -207,6 +207,11 @@ fn z_and_its_weight_are_identified() {
 fn a_and_its_tilting_torque_are_identified() {
     let found = round_trip(3);
     let (tilt, phase) = (found.number("gravity.tilt_nm"), found.number("gravity.tilt_phase_deg"));
+    let [of_tilt, of_phase] = ["gravity.tilt_nm", "gravity.tilt_phase_deg"].map(|key| found.value(key));
+    assert!(of_tilt.source.ends_with("; refined on the closed loop") && of_phase.source == of_tilt.source);
+    // Of a phase near 0, k times the error is that of k sin φ, which the refinement knows as well as k cos φ.
+    let ratio = of_phase.error.expect("an error").to_radians() * tilt / of_tilt.error.expect("an error");
+    assert!((0.1..10.0).contains(&ratio), "{ratio}");
     println!("   k {tilt} N·m, φ {phase}°");
     assert!((tilt / 30.0 - 1.0).abs() < 0.02, "{tilt} N·m");
     // 2 % of a radian; the true value is 0.

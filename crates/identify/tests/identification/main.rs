@@ -6,6 +6,7 @@ mod identify_findings;
 mod identify_presliding;
 mod identify_recordings;
 mod identify_round_trip;
+mod identify_sampling;
 mod identify_transmission;
 mod recording_conditioning;
 mod recording_conditioning_drive;
