@@ -39,7 +39,7 @@ fn the_signals_of_one_axis_are_rejected_for_all_axes() {
 #[test]
 fn options_without_effect_on_the_list_of_columns_are_rejected() {
     let folder = TestFolder::new("identify_list");
-    let recording = folder.file("two.csv", &two_axes()).to_string_lossy().into_owned();
+    let recording = folder.file("two.csv", two_axes()).to_string_lossy().into_owned();
     let rejected = |more: &[&str], options: &str| {
         let expected = format!("{options}: no effect without --axis");
         assert_rejected(&[&["identify", recording.as_str()], more].concat(), &[&expected]);
