@@ -60,6 +60,10 @@ fn a_moving_axis_without_part_in_the_contour_error_is_named() {
     let setpoints = folder.text_file("psec.csv", "time,x,u\n0,0,0\n1,0.01,0.02\n2,0.01,0.02\n");
     let found = verdict(&setpoints, &["--machine", &machine]);
     assert!(found.contains("the contour error does not contain u"), "{found}");
+    // Only X moves the tool.
+    assert!(found.starts_with("u: delay-compensated following error"), "{found}");
+    let cost = printed(&["robustness", &setpoints, "--machine", &machine, "--quiet"]);
+    assert!(cost.starts_with("cost contour: ") && !cost.starts_with("cost contour: 0.00"), "{cost}");
     assert!(!verdict("ballbar", &["--machine", &machine]).contains("does not contain"));
 }
 
