@@ -118,6 +118,8 @@ STRESS = ROOT / "target/release/virtual_axes_stress"
 COMMANDS = (
     Command("setpoints", ("run", "{folder}/path.csv"), "path.csv"),
     Command("ballbar", ("run", "ballbar"), "ballbar.csv"),
+    # Start of the process only.
+    Command("start", ("--version",), "ballbar.csv"),
     Command("circles", ("run", "{folder}/circles.yaml"), "circles.csv"),
     Command("spline", ("run", "{folder}/spline.yaml"), "spline.csv"),
     Command("mcap", ("run", "{folder}/spline.mcap"), "spline.csv"),

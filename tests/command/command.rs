@@ -51,22 +51,6 @@ fn machines_and_parameters_are_listed() {
     assert!(text.contains("| `<joint>.motor.inertia_kg_m2` | 1e-9 … 1e3 kg·m² |"), "{text}");
 }
 
-/// Paths in the folder of a test, as command line arguments.
-trait Paths {
-    fn path(&self, name: &str) -> String;
-    fn text_file(&self, name: &str, text: &str) -> String;
-}
-
-impl Paths for TestFolder {
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_string_lossy().into_owned()
-    }
-
-    fn text_file(&self, name: &str, text: &str) -> String {
-        self.file(name, text).to_string_lossy().into_owned()
-    }
-}
-
 #[track_caller]
 fn assert_rejected(output: &Output, words: &[&str]) {
     let message = String::from_utf8_lossy(&output.stderr);

@@ -15,14 +15,10 @@ fn rows(path: &str, joint: &str) -> Vec<(f64, f64)> {
     numbers.map(|(t, x)| (t.parse().expect("a time"), x.parse().expect("a position"))).collect()
 }
 
-fn path(folder: &TestFolder, name: &str) -> String {
-    folder.0.join(name).to_string_lossy().into_owned()
-}
-
 #[test]
 fn the_timetable_agrees_with_the_file() {
     let folder = TestFolder::new("campaign_timetable");
-    let file = path(&folder, "z.csv");
+    let file = folder.path("z.csv");
     let timetable = json(&["psec", "campaign", "--axis", "z", "--out", &file, "--json"]);
     let rows = rows(&file, "z");
     assert_eq!(timetable["axis"], "z");
@@ -54,11 +50,11 @@ fn the_timetable_agrees_with_the_file() {
 #[test]
 fn a_single_part_equals_the_part_of_the_whole_campaign() {
     let folder = TestFolder::new("campaign_parts");
-    let whole = path(&folder, "whole.csv");
+    let whole = folder.path("whole.csv");
     let timetable = json(&["psec", "campaign", "--axis", "a", "--out", &whole, "--json"]);
     let whole = rows(&whole, "a");
     for (i, part) in ["off", "velocity", "both"].into_iter().enumerate() {
-        let alone = path(&folder, "part.csv");
+        let alone = folder.path("part.csv");
         printed(&["psec", "campaign", "--axis", "a", "--part", part, "--out", &alone]);
         let alone: Vec<f64> = rows(&alone, "a").into_iter().map(|row| row.1).collect();
         let from = timetable["parts"][i]["from_s"].as_f64().expect("a number");
@@ -73,7 +69,7 @@ fn all_formats_give_equal_figures() {
     let folder = TestFolder::new("campaign_formats");
     let mut figures = Vec::new();
     for extension in ["csv", "yaml", "mcap"] {
-        let file = path(&folder, &format!("c.{extension}"));
+        let file = folder.path(&format!("c.{extension}"));
         let machine = ["--machine", "linear_motor_center"];
         let campaign = ["psec", "campaign", "--axis", "c", "--part", "velocity", "--out", &file];
         let text = printed(&[&campaign[..], &machine].concat());
@@ -90,7 +86,7 @@ fn all_formats_give_equal_figures() {
 #[test]
 fn range_and_feed_limits_are_kept() {
     let folder = TestFolder::new("campaign_range");
-    let file = path(&folder, "x.csv");
+    let file = folder.path("x.csv");
     let text =
         printed(&["psec", "campaign", "--axis", "x", "--range", "50,150", "--max-feed", "6", "--out", &file]);
     assert!(text.contains("x starts and ends at 55.000 mm; move it there before the start"), "{text}");
@@ -103,7 +99,7 @@ fn range_and_feed_limits_are_kept() {
 #[test]
 fn impossible_campaigns_are_rejected_in_one_line_without_a_file() {
     let folder = TestFolder::new("campaign_rejected");
-    let file = path(&folder, "x.csv");
+    let file = folder.path("x.csv");
     for (more, words) in [
         (&["--axis", "w"][..], &["--axis w", "x, y, z, a, c"][..]),
         (&["--axis", "x", "--range", "-100,100"], &["200 mm", "338 mm", "12.52 m/min"]),

@@ -17,6 +17,7 @@ mod interface;
 mod learn_command;
 mod limit_audit;
 mod output_form;
+mod own_machines;
 mod part_programs;
 mod reference;
 mod run_part_program;

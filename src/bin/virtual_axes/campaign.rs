@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use virtual_axes_core::config::{DEFAULT_MACHINE, Parameters};
+use virtual_axes_core::config::{self, DEFAULT_MACHINE, Parameters};
 use virtual_axes_identify::identify::FeedforwardMode;
 use virtual_axes_identify::identify::campaign::{Campaign, CampaignOptions, CampaignRun};
 use virtual_axes_io::files::psec_writer;
@@ -147,6 +147,11 @@ impl CampaignOutput<'_> {
         ));
         for run in self.campaign.runs() {
             text.push_str(&format!("before {}: {}\n", run.part.name(), self.settings(run).join(" ")));
+        }
+        let key = format!("{}.feedforward.velocity", self.axis);
+        let has_feedforward = self.campaign.runs().iter().any(|run| run.part != FeedforwardMode::Off);
+        if has_feedforward && self.parameters.get(&key) == Some(config::Value::Double(0.0)) {
+            text.push_str(&format!("warning: {key} is 0: no part has feedforward; set it, usually to 1\n"));
         }
         text
     }

@@ -10,7 +10,9 @@ use virtual_axes_core::machine::MachineParameters;
 use virtual_axes_core::path::Program;
 use virtual_axes_core::scenario::{Scenario, is_file_name, nearest_input};
 use virtual_axes_core::text::{escaped, nearest_hint};
+use virtual_axes_core::trajectory::limits::TRAVEL_TOLERANCE;
 use virtual_axes_core::trial::{self, Measures, SetpointSource, Tick, Trial};
+use virtual_axes_core::units::Nanoseconds;
 use virtual_axes_io::files::FileKind;
 use virtual_axes_nc::builtin::BuiltinProgram;
 
@@ -52,6 +54,9 @@ pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
     };
     let no_audit = || format!("{name}: --json requires setpoints or a part program");
     if is_machine {
+        if arguments.machine != DEFAULT_MACHINE {
+            return Err(format!("{name}: --machine requires a scenario, setpoints or a part program").into());
+        }
         if let Some(option) = arguments.part_program.given() {
             return Err(format!("{name}: {option} requires a part program").into());
         }
@@ -73,12 +78,13 @@ pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
         }
         return Ok(machine(&config));
     }
-    let config = Parameters::load(&arguments.machine)?.machine_config()?;
+    let parameters = Parameters::load(&arguments.machine)?;
+    let config = parameters.machine_config()?;
     let input = CommandInput::open(&name, None)?.with_part_program(&arguments.part_program)?.with_kept_rows();
     match input.program(&config, None)? {
         Some(_) if arguments.json => Err(no_audit().into()),
         Some(program) => scenario(&input, &config, &program),
-        None => setpoints(arguments, &input, &config),
+        None => setpoints(arguments, &input, &parameters, &config),
     }
 }
 
@@ -103,10 +109,19 @@ fn scenario(
     Ok(format!("scenario for {}: {duration:.3} s\n{description}valid\n", escaped(machine.name())))
 }
 
+/// Adds the positions before the first setpoints, in which the first trajectory starts, if another one starts elsewhere.
+fn add_start(audit: &mut LimitAudit, tick: &Tick<'_>, period: Nanoseconds) {
+    let samples: Vec<_> = tick.machine.axes().iter().map(|axis| axis.sample()).collect();
+    if samples.iter().any(|sample| (sample.psec - sample.position).abs() > TRAVEL_TOLERANCE) {
+        audit.add(-period, None, samples.iter().map(|sample| sample.position));
+    }
+}
+
 /// Validates setpoints by a simulation and audits them: rows of a CSV file, or setpoints of position cycles.
 fn setpoints(
     arguments: &CheckArguments,
     input: &CommandInput,
+    parameters: &Parameters,
     config: &MachineConfig,
 ) -> Result<String, Box<dyn Error>> {
     // Values beyond limits are results of the audit, not errors.
@@ -114,7 +129,7 @@ fn setpoints(
     let trial = Trial {
         machine,
         program: None,
-        allow_nonzero_end_velocity: false,
+        allow_nonzero_end_velocity: parameters.node_config().allow_nonzero_velocity_at_trajectory_end,
         record: false,
         measures: Measures::AXES,
     };
@@ -130,6 +145,9 @@ fn setpoints(
         match &mut rows {
             Some(audit) => input.take_rows().into_iter().flatten().for_each(|row| audit.add(row)),
             None if tick.position_instant => {
+                if tick.time == 0 {
+                    add_start(&mut audit, &tick, config.periods().position);
+                }
                 audit.add(tick.time, None, tick.machine.axes().iter().map(|axis| axis.sample().psec));
             }
             None => {}

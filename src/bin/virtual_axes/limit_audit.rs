@@ -175,9 +175,10 @@ impl LimitAudit {
         }
     }
 
-    /// Adds setpoints, m or rad per axis, with their time and source line. Times increase.
+    /// Adds setpoints, m or rad per axis, with their time and source line. Times increase; one before 0 is that of the
+    /// positions in which the axes start.
     pub fn add(&mut self, time: Nanoseconds, line: Option<usize>, psec: impl IntoIterator<Item = f64>) {
-        self.place = SetpointPlace { time: seconds(time), line };
+        self.place = SetpointPlace { time: seconds(time.max(0)), line };
         self.add_at(time, psec);
     }
 

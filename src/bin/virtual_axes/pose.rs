@@ -28,6 +28,11 @@ pub struct PoseArguments {
 pub fn run(arguments: &PoseArguments) -> Result<String, Box<dyn Error>> {
     let config = arguments.machine.parameters()?.machine_config()?;
     let kinematics = Kinematics::new(&config);
+    if !kinematics.has_linear_axis() && !kinematics.has_rotary_axis() {
+        return Err(
+            format!("{}: no joint is named x, y, z, a or c: there is no tool pose", config.name()).into()
+        );
+    }
     let mut lines = String::new();
     let mut list = Vec::new();
     for text in &arguments.joints {

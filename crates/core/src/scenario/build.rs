@@ -275,7 +275,10 @@ impl ProgramBuilder<'_> {
             // The angle is covered at full feed; each of the two ramps adds half of its length at full feed.
             let radius = (self.point[first] - u).hypot(self.point[second] - v);
             let feed = self.feed(entry, self.kinds[first], at)?;
-            sweep += sweep.signum() * feed * ramp / radius;
+            // An arc without angle or radius is rejected below.
+            if sweep != 0.0 && radius > 0.0 {
+                sweep += sweep.signum() * feed * ramp / radius;
+            }
         }
         Block::arc(&self.point, [first, second], [u, v], sweep, &end, &self.kinds)
             .map_err(|error| path_error(at, error))

@@ -2,6 +2,7 @@
 
 use crate::assess::AxisReport;
 use crate::config::AxisKind;
+use crate::kinematics::AxisRole;
 
 /// Figures of a trial.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +25,15 @@ pub struct Figures {
     pub corners: Vec<CornerFigures>,
     /// Number of further corners, which are not evaluated individually.
     pub more_corners: usize,
+}
+
+impl Figures {
+    /// Returns the moving axes that move the tool, by their names and kinds.
+    pub fn moving_tool_axes(&self) -> impl Iterator<Item = &AxisFigures> {
+        let has_role =
+            |axis: &AxisFigures| AxisRole::ALL.iter().any(|role| role.matches(&axis.name, axis.kind));
+        self.axes.iter().filter(move |axis| axis.moves && has_role(axis))
+    }
 }
 
 /// Figures of one axis, from the first setpoint until the last one has passed the delays.

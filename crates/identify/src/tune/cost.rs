@@ -98,7 +98,7 @@ impl CostTerm {
 /// Returns true if the axes can have a contour error. A single axis leaves its line only at the ends, and
 /// without a linear axis the tool tip does not move.
 pub(crate) fn has_contour(figures: &Figures) -> bool {
-    let moving = || figures.axes.iter().filter(|axis| axis.moves);
+    let moving = || figures.moving_tool_axes();
     figures.contour.is_some() && moving().count() > 1 && moving().any(|axis| axis.kind == AxisKind::Linear)
 }
 

@@ -44,9 +44,9 @@ fn without_max(figure: &Figure) -> String {
     figure.title().replace(", max", "")
 }
 
-/// Returns the largest contour error if several axes move, else the largest delay-compensated following error.
+/// Returns the largest contour error if several axes move the tool, else the largest delay-compensated following error.
 fn main_figure(figures: &Figures) -> Figure {
-    let moving = figures.axes.iter().filter(|axis| axis.moves).count();
+    let moving = figures.moving_tool_axes().count();
     let contour = figure::of_path(figures, false).into_iter().next();
     let contour = contour.filter(|_| figures.contour.is_some_and(|contour| contour.max > 0.0));
     match (worst_axis(figures), contour) {
