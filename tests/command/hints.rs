@@ -82,7 +82,7 @@ fn a_syntax_error_of_yaml_has_no_list_of_formats() {
 #[test]
 fn a_file_that_differs_in_its_extension_is_the_nearest() {
     let folder = TestFolder::new("nearest_stem");
-    let path = |name: &str| folder.0.join(name).to_string_lossy().into_owned();
+    let path = |name: &str| folder.path(name);
     folder.file("s.csv", "");
     folder.file("slot.yaml", "");
     for command in ["run", "check"] {

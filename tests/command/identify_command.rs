@@ -62,8 +62,8 @@ fn friction(a: f64, b: f64, c: f64, d: f64, v: f64) -> f64 {
 fn a_campaign_identifies_the_recorded_machine() {
     let folder = TestFolder::new("identify_out");
     let recordings = &*RECORDINGS;
-    let out = folder.0.join("new.yaml").to_string_lossy().into_owned();
-    let page = folder.0.join("page.html").to_string_lossy().into_owned();
+    let out = folder.path("new.yaml");
+    let page = folder.path("page.html");
     let mut arguments = vec!["identify", &recordings.off, &recordings.velocity, &recordings.both];
     arguments.extend(["--report", &page]);
     arguments.extend(["--axis", "x", "--feedforward", "off,velocity,both", "--json", "--out", &out]);
@@ -198,7 +198,7 @@ fn the_text_contains_results_and_missing_parameters() {
 #[test]
 fn recordings_without_information_on_the_axis_are_rejected() {
     let folder = TestFolder::new("identify_nothing");
-    let out = folder.0.join("new.yaml").to_string_lossy().into_owned();
+    let out = folder.path("new.yaml");
     // Y is stationary.
     let arguments =
         ["identify", &RECORDINGS.off, "--axis", "y", "--feedforward", "off", "--no-refine", "--out", &out];
@@ -224,7 +224,7 @@ fn invalid_input_is_rejected_with_its_name() {
     let folder = TestFolder::new("identify_bad");
     let file = |name: &str, text: &str| folder.file(name, text).to_string_lossy().into_owned();
     let recordings = &*RECORDINGS;
-    let out = |name: &str| folder.0.join(name).to_string_lossy().into_owned();
+    let out = |name: &str| folder.path(name);
     let machine = file("machine.yaml", "");
     let (empty, header) = (file("empty.csv", ""), file("header.csv", "time,x.position,x.current\n"));
     let scenario = file("scenario.yaml", &printed(&["scenarios", "--show", "ballbar"]));
@@ -299,7 +299,7 @@ fn invalid_input_is_rejected_with_its_name() {
 #[test]
 fn an_interrupted_identification_leaves_no_file() {
     let folder = TestFolder::new("identify_interrupted");
-    let out = folder.0.join("new.yaml").to_string_lossy().into_owned();
+    let out = folder.path("new.yaml");
     let recordings = &*RECORDINGS;
     let mut arguments =
         vec!["identify", &recordings.off, "--axis", "x", "--feedforward", "off", "--out", &out];

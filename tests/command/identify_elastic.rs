@@ -36,7 +36,7 @@ fn chirp() -> String {
 #[test]
 fn both_encoders_identify_the_transmission_of_a_trace() {
     let folder = TestFolder::new("identify_transmission");
-    let path = |name: &str| folder.0.join(name).to_string_lossy().into_owned();
+    let path = |name: &str| folder.path(name);
     let psec = folder.file("chirp.csv", chirp()).to_string_lossy().into_owned();
     let of = |trace: &str| -> Value {
         let run = ["run", &psec, "--quiet", "--trace", trace, "--trace-period", "500us"];
@@ -78,7 +78,7 @@ fn both_encoders_identify_the_transmission_of_a_trace() {
 #[test]
 fn axes_at_rest_in_all_recordings_are_left_out() {
     let folder = TestFolder::new("identify_resting");
-    let path = |name: &str| folder.0.join(name).to_string_lossy().into_owned();
+    let path = |name: &str| folder.path(name);
     let psec = folder.file("chirp.csv", chirp()).to_string_lossy().into_owned();
     let (trace, out) = (path("both.csv"), path("out.yaml"));
     let run = ["run", &psec, "--quiet", "--trace", &trace, "--trace-period", "500us"];
@@ -107,7 +107,7 @@ fn axes_at_rest_in_all_recordings_are_left_out() {
 #[test]
 fn slow_reversals_identify_the_presliding_of_a_trace() {
     let folder = TestFolder::new("identify_presliding");
-    let path = |name: &str| folder.0.join(name).to_string_lossy().into_owned();
+    let path = |name: &str| folder.path(name);
     let mut text = "time,x\n".to_owned();
     for k in 0..4200 {
         let t = f64::from(k) * 0.006;

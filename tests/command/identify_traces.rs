@@ -75,7 +75,7 @@ fn without_axis_the_columns_and_the_next_command_are_listed() {
 #[test]
 fn all_axes_are_identified_into_one_machine_file() {
     let (files, folder) = (&*FILES, TestFolder::new("identify_all"));
-    let out = folder.0.join("identified.yaml").to_string_lossy().into_owned();
+    let out = folder.path("identified.yaml");
     let arguments = ["identify", &files.trace, "--axis", "all", "--machine", &files.machine];
     let found = json(&[arguments.as_slice(), &REFINE, &["--json", "--out", &out]].concat());
     let found = found.as_array().expect("a list");
@@ -117,9 +117,8 @@ moves:
 #[test]
 fn all_axes_are_identified_with_one_position_cycle() {
     let folder = TestFolder::new("identify_cycle");
-    let file = |name: &str| folder.0.join(name).to_string_lossy().into_owned();
-    let (program, trace, out) = (file("moves.yaml"), file("trace.csv"), file("identified.yaml"));
-    std::fs::write(&program, TWO_AXES).expect("a program");
+    let program = folder.text_file("moves.yaml", TWO_AXES);
+    let (trace, out) = (folder.path("trace.csv"), folder.path("identified.yaml"));
     let truth = ["periods.position_ms=2", "x.delays.alpha_ms=6", "x.delays.beta_ms=4", "y.delays.alpha_ms=8"];
     let truth: Vec<&str> = truth.iter().flat_map(|set| ["--set", set]).collect();
     let record = ["run", &program, "--trace", &trace, "--trace-period", "20ms", "--quiet"];
@@ -143,9 +142,8 @@ fn all_axes_are_identified_with_one_position_cycle() {
 #[test]
 fn traces_without_feedforward_show_neither_its_weights_nor_its_delays() {
     let folder = TestFolder::new("identify_off");
-    let file = |name: &str| folder.0.join(name).to_string_lossy().into_owned();
-    let (program, off, both) = (file("moves.yaml"), file("off.csv"), file("both.csv"));
-    std::fs::write(&program, TWO_AXES).expect("a program");
+    let program = folder.text_file("moves.yaml", TWO_AXES);
+    let (off, both) = (folder.path("off.csv"), folder.path("both.csv"));
     let record = |trace: &str, set: &[&str]| {
         let run = ["run", &program, "--trace", trace, "--trace-period", "20ms", "--quiet"];
         printed(&[run.as_slice(), set].concat());
@@ -181,7 +179,7 @@ fn traces_without_feedforward_show_neither_its_weights_nor_its_delays() {
 #[test]
 fn an_invalid_result_is_printed_but_not_written() {
     let (files, folder) = (&*FILES, TestFolder::new("identify_invalid"));
-    let out = folder.0.join("identified.yaml").to_string_lossy().into_owned();
+    let out = folder.path("identified.yaml");
     let constant = 10.0 * files.guesses[0].config.motor.torque_constant;
     let set = format!("x.motor.torque_constant_nm_a={constant}");
     let one = ["identify", &files.trace, "--axis", "x", "--machine", &files.machine];

@@ -8,8 +8,7 @@ use virtual_axes_verification::fixtures::tuning::CIRCLE;
 fn learned_setpoints_run_with_the_same_positions() {
     let folder = TestFolder::new("learn_out");
     let circle = folder.file("circle.yaml", CIRCLE).to_string_lossy().into_owned();
-    let [out, page, trace] = ["learned.csv", "learned.html", "trace.csv"]
-        .map(|name| folder.0.join(name).to_string_lossy().into_owned());
+    let [out, page, trace] = ["learned.csv", "learned.html", "trace.csv"].map(|name| folder.path(name));
     let arguments = ["learn", &circle, "--iterations", "3", "--json", "--out", &out, "--report", &page];
     let found = json(&arguments);
     let runs = found["iterations"].as_array().expect("a list");
@@ -42,7 +41,7 @@ fn part_programs_csv_files_and_other_machines_can_be_learned() {
     let folder = TestFolder::new("learn_inputs");
     let program =
         folder.file("move.nc", "G21 G90 G94\nG1 X10 F3000\nG1 Y10\nM2\n").to_string_lossy().into_owned();
-    let psec = folder.0.join("psec.csv").to_string_lossy().into_owned();
+    let psec = folder.path("psec.csv");
     printed(&["psec", &program, "--out", &psec]);
     let on = "x.position_loop.controller=gpc,y.position_loop.controller=gpc";
     for input in [&program, &psec] {

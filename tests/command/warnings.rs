@@ -136,7 +136,7 @@ fn limits_above_those_of_the_axes_are_noted() {
     let scenario = "description: d\nfeed_m_min: 6\nlimits: {acceleration_m_s2: 25, jerk_m_s3: 50}\nmoves:\n  - line: {x_mm: 40}\n";
     let note = "limits.acceleration_m_s2: 25 exceeds that of the axes, 3, which keep their own";
     assert!(warnings(&folder, "high.yaml", scenario).ends_with(&format!("high.yaml: {note}\n")));
-    let file = folder.0.join("high.yaml").to_string_lossy().into_owned();
+    let file = folder.path("high.yaml");
     let text = printed(&["run", &file]);
     assert!(text.contains(note) && !text.contains("jerk_m_s3"), "{text}");
 }

@@ -156,7 +156,7 @@ impl ProgramBuilder<'_> {
             return Err(wrong("a move must have exactly one of line, arc, spline, dwell_s"));
         }
         if let Some(YamlNumber(dwell)) = entry.dwell_s {
-            reject_keys(entry, &OPTIONS, "a dwell", &at)?;
+            reject_options(entry, "", "a dwell", &at)?;
             check_time(&at, "dwell_s", dwell)?;
             let Some(last) = self.moves.last_mut() else {
                 return Err(wrong("dwell_s must follow a move; use rest_s for a rest before the first move"));
@@ -185,12 +185,8 @@ impl ProgramBuilder<'_> {
         };
         let kind = block.kind();
         match kind {
-            AxisKind::Linear => {
-                reject_keys(entry, &["feed_rpm", "corner_rpm"], "a move of linear axes", &at)?
-            }
-            AxisKind::Rotary => {
-                reject_keys(entry, &["feed_m_min", "corner_m_min"], "a move of rotary axes only", &at)?;
-            }
+            AxisKind::Linear => reject_options(entry, "_rpm", "a move of linear axes", &at)?,
+            AxisKind::Rotary => reject_options(entry, "_m_min", "a move of rotary axes only", &at)?,
         }
         let feed = self.feed(entry, kind, &at)?;
         if let FeedProfile::Cosine { ramp } = profile
@@ -297,13 +293,9 @@ impl ProgramBuilder<'_> {
     }
 }
 
-/// Options of a move.
-const OPTIONS: [&str; 5] = ["feed_m_min", "feed_rpm", "corner_m_min", "corner_rpm", "ramp_s"];
-
-/// Rejects options of a move that do not apply to it.
-fn reject_keys(entry: &MoveEntry, keys: &[&str], found: &str, at: &str) -> Result<(), ScenarioError> {
-    let values = [entry.feed_m_min, entry.feed_rpm, entry.corner_m_min, entry.corner_rpm, entry.ramp_s];
-    match OPTIONS.iter().zip(values).find(|(key, value)| keys.contains(key) && value.is_some()) {
+/// Rejects options of a move whose keys end in `suffix`, since they do not apply to it.
+fn reject_options(entry: &MoveEntry, suffix: &str, found: &str, at: &str) -> Result<(), ScenarioError> {
+    match entry.options().iter().find(|(key, value)| key.ends_with(suffix) && value.is_some()) {
         Some((key, _)) => Err(ScenarioError::Key {
             at: at.to_owned(),
             key: (*key).to_owned(),

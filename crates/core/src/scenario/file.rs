@@ -58,6 +58,19 @@ pub(super) struct MoveEntry {
     pub ramp_s: Option<YamlNumber>,
 }
 
+impl MoveEntry {
+    /// Returns the options with their keys.
+    pub fn options(&self) -> [(&'static str, Option<YamlNumber>); 5] {
+        [
+            ("feed_m_min", self.feed_m_min),
+            ("feed_rpm", self.feed_rpm),
+            ("corner_m_min", self.corner_m_min),
+            ("corner_rpm", self.corner_rpm),
+            ("ramp_s", self.ramp_s),
+        ]
+    }
+}
+
 /// Circular arc about `center`, given by its angle or by its number of turns.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -175,29 +175,25 @@ impl AxisValidation {
     ) -> Result<Self, AxisIdentificationError> {
         let is_unknown =
             recorded.feedforward.is_none() && are_production_traces(&[recorded.input()], axis, periods);
-        if !is_unknown {
-            let agreement = validate(&recorded.input(), axis, periods)?;
-            return Ok(AxisValidation { recorded, agreement });
+        if is_unknown {
+            let mut best: Option<(f64, FeedforwardMode)> = None;
+            for mode in FeedforwardMode::ALL {
+                recorded.feedforward = Some(mode);
+                let baseline = validate(&recorded.input(), axis, periods)?.baseline;
+                let residual = baseline.map_or(f64::INFINITY, |baseline| baseline.model);
+                if best.is_none_or(|(least, _)| residual < least) {
+                    best = Some((residual, mode));
+                }
+            }
+            recorded.feedforward = best.map(|(_, mode)| mode);
+            let what = format!(
+                "{}: feedforward {} is assumed: the identified axis deviates least with it",
+                recorded.signals.name,
+                recorded.feedforward.map_or("none", FeedforwardMode::name)
+            );
+            recorded.findings.push(Finding::note("feedforward-inferred", what));
         }
-        let mut tried = Vec::new();
-        for mode in [FeedforwardMode::Off, FeedforwardMode::Velocity, FeedforwardMode::Both] {
-            recorded.feedforward = Some(mode);
-            let agreement = validate(&recorded.input(), axis, periods)?;
-            let residual = agreement.baseline.as_ref().map_or(f64::INFINITY, |baseline| baseline.model);
-            tried.push((mode, residual, agreement));
-        }
-        tried.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((mode, _, agreement)) = tried.into_iter().next() else {
-            let agreement = validate(&recorded.input(), axis, periods)?;
-            return Ok(AxisValidation { recorded, agreement });
-        };
-        recorded.feedforward = Some(mode);
-        let what = format!(
-            "{}: feedforward {} is assumed: the identified axis deviates least with it",
-            recorded.signals.name,
-            mode.name()
-        );
-        recorded.findings.push(Finding::note("feedforward-inferred", what));
+        let agreement = validate(&recorded.input(), axis, periods)?;
         Ok(AxisValidation { recorded, agreement })
     }
 }
