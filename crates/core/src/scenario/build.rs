@@ -38,7 +38,7 @@ pub(super) fn program(
         name,
         kinds: joints.iter().map(|joint| joint.kind).collect(),
         point: vec![0.0; joints.len()],
-        limits: UNLIMITED,
+        limits: ByKind::default(),
         feeds: default_feeds(name, file, feed)?,
         moves: Vec::new(),
         joints,
@@ -79,7 +79,7 @@ pub(super) fn program(
 }
 
 /// Value for linear moves and value for rotary moves, in m or rad and s.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct ByKind<T> {
     linear: T,
     rotary: T,
@@ -93,12 +93,6 @@ impl<T: Copy> ByKind<T> {
         }
     }
 }
-
-/// Limits of a path that has the limits of its axes only.
-const UNLIMITED: ByKind<PathLimits> = {
-    let limits = PathLimits { acceleration: f64::INFINITY, jerk: f64::INFINITY };
-    ByKind { linear: limits, rotary: limits }
-};
 
 /// Returns the default feeds of the moves; `replaced` is in m/min or rpm.
 fn default_feeds(
@@ -358,7 +352,7 @@ pub(super) fn notes_on_limits(values: &Values, machine: &MachineConfig) -> Vec<S
 
 /// Parses the path limits, which apply in addition to the axis limits.
 fn path_limits(values: &Values, at: &str) -> Result<ByKind<PathLimits>, ScenarioError> {
-    let mut limits = UNLIMITED;
+    let mut limits = ByKind::<PathLimits>::default();
     for (key, &YamlNumber(value)) in values {
         let (limit, unit) = match key.as_str() {
             "acceleration_m_s2" => (&mut limits.linear.acceleration, 1.0),
