@@ -31,11 +31,11 @@ command -v cargo >/dev/null || { echo "demo: needs cargo, Rust's build tool (htt
 
 # The setup mostly waits for the network and single processes; cargo builds in parallel.
 mkdir -p "$root/.build/logs"
-"$root/tools/setup.sh" >"$root/.build/logs/demo-setup.log" 2>&1 </dev/null &
+"$root/tools/setup.sh" --demo >"$root/.build/logs/demo-setup.log" 2>&1 </dev/null &
 setup=$!
 trap 'kill -TERM "$setup" 2>/dev/null || true' EXIT
 echo "demo: building, and setting up Python beside it (log: .build/logs/demo-setup.log); minutes at the first run" >&2
-(cd "$root" && exec cargo build --release --locked --bins) &
+(cd "$root" && exec cargo build --release --locked --bin virtual_axes --bin virtual_axes_node) &
 build=$!
 trap 'kill -TERM "$setup" "$build" 2>/dev/null || true' EXIT
 # Whichever fails first ends the demo.

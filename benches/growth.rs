@@ -1,7 +1,7 @@
-//! Scaling of the cost of a simulation with the length of the setpoints, axes, machines and cores.
+//! Scaling of the cost of a simulation with the number of axes and the options of the drive model.
 //!
 //!     cargo bench --no-default-features --bench growth
-//!     cargo bench --no-default-features --bench growth -- axes cores
+//!     cargo bench --no-default-features --bench growth -- transmissions
 //!
 //! The rows of a table are run in turns, so that the background load of the computer affects all of them. A table
 //! shows medians over the rounds and their ratio to the first row per simulated second of a machine.
@@ -9,25 +9,16 @@
 use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use rayon::ThreadPoolBuilder;
-use rayon::prelude::*;
 use virtual_axes_core::assess::AxisAssessor;
 use virtual_axes_core::config::{MachineConfig, ValueSource, parse_assignment};
 use virtual_axes_core::machine::{Machine, MachineParameters};
-use virtual_axes_core::trial::{self, Figures, GridSource, Measures, SetpointSource, SourceError, Trial};
 use virtual_axes_core::units::seconds;
-use virtual_axes_verification::fixtures::machines::{AXES, parameters, program, setpoints};
+use virtual_axes_verification::fixtures::machines::{AXES, parameters};
 
 /// Rounds of a table; odd.
 const ROUNDS: usize = 11;
-/// Time limit of a row over all rounds; later rounds of the row are skipped, except the first.
-const LONGEST: Duration = Duration::from_secs(20);
-/// Machines simulated side by side on a core, as in a search.
-const TOGETHER: usize = 32;
-/// Machines of the table of cores.
-const SWEEP: usize = 256;
 /// Simulated time of the table of axes, s.
 const AXES_TIME: f64 = 120.0;
 /// Period of the motion, position cycles: a minute.
@@ -49,22 +40,14 @@ impl<'a> Row<'a> {
     }
 }
 
-fn seconds_of(run: &mut dyn FnMut()) -> f64 {
-    let began = Instant::now();
-    run();
-    began.elapsed().as_secs_f64()
-}
-
 /// Runs the rows in turns and prints them.
 fn table(title: &str, column: &str, mut rows: Vec<Row>) {
     let mut times: Vec<Vec<f64>> = vec![Vec::new(); rows.len()];
     for _ in 0..ROUNDS {
         for (row, times) in rows.iter_mut().zip(&mut times) {
-            let before: f64 = times.iter().sum();
-            let next = before / times.len().max(1) as f64;
-            if before + next <= LONGEST.as_secs_f64() {
-                times.push(seconds_of(&mut row.run));
-            }
+            let began = Instant::now();
+            (row.run)();
+            times.push(began.elapsed().as_secs_f64());
         }
     }
     println!("\n{title}");
@@ -83,59 +66,10 @@ fn table(title: &str, column: &str, mut rows: Vec<Row>) {
     }
 }
 
-/// Source that repeats the motion [`MOTION`] for a number of position cycles without storing it.
-struct Cycle {
-    joints: [usize; AXES],
-    rows: Arc<Vec<[f64; AXES]>>,
-    next: usize,
-    count: usize,
-}
-
-impl GridSource for Cycle {
-    fn joints(&self) -> &[usize] {
-        &self.joints
-    }
-
-    fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError> {
-        let is_more = self.next < self.count;
-        row.copy_from_slice(&self.rows[self.next % CYCLE]);
-        self.next += 1;
-        Ok(is_more)
-    }
-}
-
 fn cycle() -> Arc<Vec<[f64; AXES]>> {
     let at =
         |k: usize| MOTION.map(|(size, turns)| size * (1.0 - (TAU * turns * k as f64 / CYCLE as f64).cos()));
     Arc::new((0..CYCLE).map(at).collect())
-}
-
-/// Measures the length of the setpoints: computed on demand, with figures of tool and axes, without a trace.
-fn length(config: &MachineConfig) {
-    let rows = cycle();
-    let trial = Trial {
-        machine: config,
-        program: None,
-        allow_nonzero_end_velocity: false,
-        record: false,
-        measures: Measures::ALL,
-    };
-    let run = |count: usize| {
-        let source = Cycle { joints: [0, 1, 2, 3, 4], rows: Arc::clone(&rows), next: 0, count: count + 1 };
-        black_box(trial::run(&trial, SetpointSource::Grid(Box::new(source)), |_| Ok(())).expect("a run"));
-    };
-    let period = seconds(config.periods().position);
-    let lengths = [1, 10, 100, 1000];
-    let row = |minutes: usize| {
-        let count = minutes * CYCLE;
-        Row::new(minutes, count as f64 * period, move || run(count))
-    };
-    table("length: one machine of five axes, figures, no trace", "minutes", lengths.map(row).into());
-    println!("{:>10} {:>20}", "minutes", "largest memory, KiB");
-    for minutes in &lengths[..3] {
-        let held = allocation_counter::measure(|| run(minutes * CYCLE)).bytes_max;
-        println!("{minutes:>10} {:20.1}", held as f64 / 1024.0);
-    }
 }
 
 /// Returns the row of a machine with a number of axes, those of `config` in turns, with their figures.
@@ -212,85 +146,15 @@ fn transmissions(rigid: &MachineConfig) {
     table("transmissions: one machine of five axes, figures of the axes", "axes", rows);
 }
 
-/// Creates machines with different gains.
-fn variants(count: usize) -> Vec<MachineConfig> {
-    let variant = |i: usize| {
-        let gain = 1.0 + 0.5 * i as f64 / count as f64;
-        parameters(&[("x.position_loop.gain", gain), ("y.position_loop.gain", gain)])
-            .machine_config()
-            .expect("a machine")
-    };
-    (0..count).map(variant).collect()
-}
-
-/// Simulates machines on the ballbar test as in a search: side by side, on the cores of the pool.
-fn sweep(trial: &Trial<'_>, variants: &[MachineConfig], own: &[usize]) -> Vec<Figures> {
-    let run = |some: &[MachineConfig]| {
-        let program = trial.program.clone().expect("planned");
-        trial::run_variants(trial, setpoints("ballbar", program, trial.machine), some, own, || Ok(()))
-            .expect("a run")
-    };
-    variants.par_chunks(TOGETHER).with_max_len(1).flat_map(run).collect()
-}
-
-/// Measures increasing numbers of machines on one core, and the same machines on several cores.
-fn machines(config: &MachineConfig, counts: &[usize], cores: &[usize]) {
-    let program = program("ballbar", config);
-    let (duration, own) = (program.duration(), [0, 1]);
-    let trial = Trial {
-        machine: config,
-        program: Some(program),
-        allow_nonzero_end_velocity: false,
-        record: false,
-        measures: Measures::ALL,
-    };
-    let most = counts.iter().copied().max().unwrap_or(0);
-    let all = variants(most);
-    let rows = |cores: usize| {
-        let (trial, all, own) = (&trial, &all, &own);
-        let pool = Arc::new(ThreadPoolBuilder::new().num_threads(cores).build().expect("threads"));
-        counts.iter().map(move |&count| {
-            let (variants, pool) = (&all[..count], Arc::clone(&pool));
-            let name = if counts.len() > 1 { count } else { cores };
-            Row::new(name, duration * count as f64, move || {
-                black_box(pool.install(|| sweep(trial, variants, own)));
-            })
-        })
-    };
-    let rows = cores.iter().flat_map(|&cores| rows(cores)).collect();
-    match counts {
-        [count] => {
-            table(&format!("cores: {count} machines on the ballbar, all figures but circles"), "cores", rows)
-        }
-        _ => table("machines: on the ballbar, one core, all figures but circles", "machines", rows),
-    }
-}
-
-/// Names of the tables.
-const TABLES: [&str; 5] = ["length", "axes", "transmissions", "machines", "cores"];
-
 fn main() {
     // `cargo bench` passes --bench.
     let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
-    // Other names select benchmarks of other programs of `cargo bench`.
-    if !wanted.is_empty() && !wanted.iter().any(|word| TABLES.contains(&word.as_str())) {
-        println!("no table is named {}, allowed: {}", wanted.join(", "), TABLES.join(", "));
-    }
     let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|word| word == name);
     let config = parameters::<&str>(&[]).machine_config().expect("the shipped machine");
-    if is_wanted("length") {
-        length(&config);
-    }
     if is_wanted("axes") {
         axes(&config);
     }
     if is_wanted("transmissions") {
         transmissions(&config);
-    }
-    if is_wanted("machines") {
-        machines(&config, &[1, 8, 32, 64, 256, 1024], &[1]);
-    }
-    if is_wanted("cores") {
-        machines(&config, &[SWEEP], &[1, 2]);
     }
 }

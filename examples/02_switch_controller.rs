@@ -20,7 +20,8 @@ pub fn run(controller: &str) -> Result<f64, Box<dyn Error>> {
         parameters.set(&key, Value::Text(controller.to_owned()), &ValueSource::named("example"))?;
     }
     let machine = parameters.machine_config()?;
-    let program = Arc::new(Scenario::load("ballbar")?.program(&machine, None)?);
+    let program =
+        Arc::new(Scenario::load("ballbar", virtual_axes_builtin::SCENARIOS)?.program(&machine, None)?);
     let limits = joint_limits(&machine, "");
     let source = ProgramSource::new(Arc::clone(&program), "ballbar", &limits, machine.periods().position);
     let trial = Trial {

@@ -21,7 +21,8 @@ pub fn run(gains: &[f64]) -> Result<Vec<f64>, Box<dyn Error>> {
         Ok(parameters.machine_config()?)
     };
     let variants: Vec<MachineConfig> = gains.iter().map(variant).collect::<Result<_, _>>()?;
-    let program = Arc::new(Scenario::load("corner-90")?.program(&machine, None)?);
+    let program =
+        Arc::new(Scenario::load("corner-90", virtual_axes_builtin::SCENARIOS)?.program(&machine, None)?);
     let limits = joint_limits(&machine, "");
     let source = ProgramSource::new(Arc::clone(&program), "corner-90", &limits, machine.periods().position);
     let trial = Trial {

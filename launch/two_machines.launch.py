@@ -2,8 +2,8 @@
 
 ros2 launch virtual_axes two_machines.launch.py right_controller:=gpc rviz:=true
 
-Give both the same setpoints, on /left/psec and /right/psec. With time:=fast one of them publishes
-the clock that both follow.
+Give both the same setpoints, on /left/psec and /right/psec. With time:=fast the left one publishes
+the clock that the right one follows.
 """
 
 from pathlib import Path
@@ -28,7 +28,7 @@ ARGUMENTS = [
     ("left_controller", "as_machine", CONTROLLERS, "Position controller of every joint on the left"),
     ("right_controller", "as_machine", CONTROLLERS, "Position controller of every joint on the right"),
     ("distance", "2.5", None, "Distance of the right machine frame from the left one along X, m"),
-    ("time", "real", ["real", "fast", "sim"], "As in virtual_axes.launch.py"),
+    ("time", "real", ["real", "fast", "sim"], "As in virtual_axes.launch.py; with fast the right machine follows"),
     ("use_sim_time", "as_time", ["as_time", "true", "false"], "As in virtual_axes.launch.py"),
     ("robot_state_publisher", "true", ["true", "false"], "Publish models and transforms"),
     ("rviz", "false", ["true", "false"], "Show both in RViz (package rviz2)"),
@@ -67,6 +67,9 @@ def start(context: LaunchContext) -> list[object]:
             "record": str(Path(argument["record"], f"{side}.mcap")) if argument["record"] else "",
             **{key: argument[key] for key in ("time", "use_sim_time", "robot_state_publisher", "log_level")},
         }
+        if argument["time"] == "fast" and index > 0:
+            # Only one node may publish the clock.
+            of_side |= {"time": "sim", "use_sim_time": "as_time"}
         # In a group: the arguments of one must not reach the other.
         include = IncludeLaunchDescription(PythonLaunchDescriptionSource(source), launch_arguments=of_side.items())
         actions.append(GroupAction([include]))

@@ -81,6 +81,17 @@ def require_rviz(context: LaunchContext) -> None:
         ) from error
 
 
+def require_robot_state_publisher(context: LaunchContext) -> None:
+    """Rejects robot_state_publisher:=true without its package, before any node starts."""
+    try:
+        ExecutableInPackage("robot_state_publisher", "robot_state_publisher").perform(context)
+    except Exception as error:
+        raise RuntimeError(
+            "package robot_state_publisher not found; install it with "
+            "apt install ros-$ROS_DISTRO-robot-state-publisher, or give robot_state_publisher:=false"
+        ) from error
+
+
 def machine_file(machine: str) -> Path:
     """Returns the parameter file of a machine: a path, or the name of a built-in one."""
     built_in = SHARE / "config" / f"{machine}.yaml"
@@ -186,6 +197,7 @@ def start(context: LaunchContext) -> list[object]:
         )
     ]
     if argument["robot_state_publisher"] == "true":
+        require_robot_state_publisher(context)
         description, messages = robot_description(context, machine, argument["joint_prefix"])
         actions += messages
         actions.append(

@@ -1,11 +1,11 @@
 //! ROS 2 node that simulates the axes of a machine tool.
 //!
-//! [`ingress`] converts and validates command-line arguments and incoming messages. [`interface`] describes topics,
-//! services and diagnostics as data. [`ros`] holds the node: its endpoints, parameters and pacing; `ros::node::run` runs it until a signal ends it. The simulation
-//! itself is in `virtual_axes_core` and needs no ROS.
+//! [`validation`] converts and validates command-line arguments and incoming messages. [`ros_interface`] describes topics,
+//! services and diagnostics as data. [`ros`] holds the node; `ros::node::run` runs it until a signal ends it. The simulation
+//! itself is in `virtual_axes_core` and needs no ROS, the middleware in `virtual_axes_dds`.
 //!
 //! ```
-//! use virtual_axes::ingress::args::Command;
+//! use virtual_axes::validation::args::Command;
 //!
 //! let arguments = ["--ros-args", "-r", "__ns:=/cell", "-r", "psec:=setpoints"];
 //! let Command::Run(args) = Command::parse(arguments, "virtual_axes")? else { unreachable!() };
@@ -17,7 +17,7 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
 
-pub mod ingress;
-pub mod interface;
 #[cfg(feature = "ros")]
 pub mod ros;
+pub mod ros_interface;
+pub mod validation;

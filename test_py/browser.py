@@ -20,6 +20,7 @@ TIMEOUT = 60.0
 """Timeout of each wait, s; a start on a busy machine takes seconds."""
 PROGRAMS = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"]
 FLAGS = [
+    "--enable-unsafe-swiftshader",
     "--headless=new",
     "--no-sandbox",
     "--disable-gpu",

@@ -7,10 +7,8 @@ target/release/virtual_axes_node, another with VIRTUAL_AXES_NODE.
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -20,9 +18,8 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 for variable in ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY", "ROS_DOMAIN_ID"):
     os.environ.pop(variable, None)
 
-# launch is not on PyPI: its stand-in is imported under the names of the real package.
-sys.path.insert(0, str(Path(__file__).parent / "launch_standin"))
-
+# launch is not on PyPI: its stand-in provides the names of the real package.
+import launch_standin  # noqa: E402, F401
 from motion import go_home  # noqa: E402
 from node_process import Node, node_binary, use_private_shared_memory  # noqa: E402
 from virtual_axes_py.ros import AxesClient  # noqa: E402

@@ -18,7 +18,17 @@ import numpy as np
 
 from node_process import Node
 from polar_chart import Circle, draw
-from virtual_axes_py.ros import AxesClient, Ballbar, Recording, ballbar, circular_deviation, joint_trajectory
+
+# The client without its package, which needs the compiled module.
+sys.path.append(str(Path(__file__).resolve().parent.parent / "crates/py/python/virtual_axes_py"))
+from ros import (  # noqa: E402  (the path to it is set above)
+    AxesClient,
+    Ballbar,
+    Recording,
+    ballbar,
+    circular_deviation,
+    joint_trajectory,
+)
 
 AXES = ("x", "y")
 RUNS: dict[str, dict[str, object]] = {
@@ -44,17 +54,8 @@ def measure(drive: AxesClient, path: Ballbar) -> Recording:
 
 def report(path: Ballbar, runs: dict[str, Recording]) -> str:
     """Returns the table of radial deviations and following errors, µm."""
-    head = (
-        "ballbar R 150 mm, 15 m/min",
-        "mean",
-        "min",
-        "max",
-        "G",
-        "specified",
-        "paper",
-        "X, Y max |e| delay-compensated",
-    )
-    rows = [head]
+    head = ["ballbar R 150 mm, 15 m/min", "mean", "min", "max", "G", "specified", "paper"]
+    rows = [(*head, "X, Y max |e| delay-compensated")]
     for title, run in runs.items():
         deviation = run.radial_deviation(path.center, path.radius)[run.within(path.steady)] * 1e6
         error = [np.abs(run.states["synchronized_tracking_error", axis]).max() * 1e6 for axis in AXES]
@@ -70,15 +71,9 @@ def report(path: Ballbar, runs: dict[str, Recording]) -> str:
                 f"{error[0]:.0f}, {error[1]:.0f}",
             )
         )
-    widths = [max(len(row[column]) for row in rows) for column in range(len(head))]
-    lines = [
-        "  ".join(
-            cell.ljust(width) if column == 0 else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths))
-        )
-        for row in rows
-    ]
-    lines.insert(1, "  ".join("-" * width for width in widths))
+    first, *widths = [max(map(len, column)) for column in zip(*rows)]
+    rows.insert(1, tuple("-" * width for width in (first, *widths)))
+    lines = ["  ".join([row[0].ljust(first), *map(str.rjust, row[1:], widths)]) for row in rows]
     lines += [
         "",
         "Sampled every position cycle, as published; `virtual_axes run` takes every tick, so that its G is larger.",

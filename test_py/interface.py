@@ -53,19 +53,12 @@ class Interface:
 def interfaces() -> list[Interface]:
     """Returns all topics, services and actions."""
     description = printed("interface")
-    found = [
-        Interface(
-            direction=row["direction"],
-            name=row["name"],
-            type=row["type"],
-            qos=row["qos"],
-            conditions=tuple((condition["parameter"], condition["value"]) for condition in row["conditions"]),
-        )
-        for row in description["topics"]
-    ]
+    found = []
+    for row in description["topics"]:
+        conditions = tuple((condition["parameter"], condition["value"]) for condition in row["conditions"])
+        found.append(Interface(row["direction"], row["name"], row["type"], row["qos"], conditions))
     for direction in ("service", "action"):
-        rows = description[f"{direction}s"]
-        found += [Interface(direction, row["name"], row["type"], qos=None, conditions=()) for row in rows]
+        found += [Interface(direction, row["name"], row["type"], None, ()) for row in description[f"{direction}s"]]
     return found
 
 

@@ -14,8 +14,9 @@ from node_process import node_binary
 
 ROOT = Path(__file__).resolve().parent.parent
 substitutions.PROGRAMS["virtual_axes", "virtual_axes"] = str(node_binary().with_name("virtual_axes"))
-# Any executable file: RViz is not installed here, and launch only looks for it.
-substitutions.PROGRAMS["rviz2", "rviz2"] = sys.executable
+# Any executable file: these are not installed here, and launch only looks for them.
+for program in ("rviz2", "robot_state_publisher"):
+    substitutions.PROGRAMS[program, program] = sys.executable
 
 
 def description(file: str) -> launch.LaunchDescription:

@@ -6,6 +6,7 @@ import ctypes
 import fcntl
 import os
 import random
+import re
 import signal
 import socket
 import subprocess
@@ -68,11 +69,11 @@ def resident_mb(pid: int) -> float:
 
 def status_of(pid: int, key: str) -> int:
     """Returns a number of /proc/PID/status; memory in kB."""
-    for line in Path(f"/proc/{pid}/status").read_text().splitlines():
-        if line.startswith(f"{key}:"):
-            return int(line.split()[1])
-    # The process is a zombie: its exit status has not been read.
-    raise ProcessLookupError(f"process {pid} has no {key}")
+    found = re.search(rf"^{key}:\s*(\d+)", Path(f"/proc/{pid}/status").read_text(), re.MULTILINE)
+    if found is None:
+        # The process is a zombie: its exit status has not been read.
+        raise ProcessLookupError(f"process {pid} has no {key}")
+    return int(found[1])
 
 
 def node_binary() -> Path:

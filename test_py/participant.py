@@ -3,10 +3,9 @@
     python test_py/participant.py listen TOPIC DEPTH  reliable; writes the received stamps for each input line
     python test_py/participant.py send POINTS         one trajectory with this number of points on psec
     python test_py/participant.py sink DEPTH          reliable; drops joint_states, motor_currents, drive_states
-    python test_py/participant.py echo SERVICE        service with a constant response
-    python test_py/participant.py probe SERVICE SERVICE
-                                                      calls the two alternately; writes the durations for each input
-                                                      line, or the service that did not respond
+    python test_py/participant.py once NAME DURABILITY POLL KEEP_ALIVE
+                                                      a trajectory of a joint NAME when psec is matched, polled every
+                                                      POLL s, as `ros2 topic pub --once`; leaves KEEP_ALIVE s later
 
 Each writes a line to standard output when it is ready, and ends with its parent process.
 """
@@ -16,10 +15,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import select
-import signal
 import struct
-import subprocess
 import sys
 import threading
 import time
@@ -29,25 +25,21 @@ from typing import Any
 import numpy as np
 import rclpy
 from builtin_interfaces.msg import Duration
-from rcl_interfaces.srv import GetParameters
 from rclpy._rclpy_pybind11 import InvalidHandle, RCLError
 from rclpy.executors import ExternalShutdownException
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from virtual_axes.msg import DriveStates, MotorCurrents
 
-from node_process import die_with_parent, separate_output
+from line_process import PATIENCE_S, LineProcess
+from node_process import separate_output
 from virtual_axes_py.ros import DEEP_QOS, PSEC_QOS, SETTLE_S, stamp_of
 
 READY = "ready"
 SPINS = "spins"
 """Name of the thread that spins a node."""
-PATIENCE_S = 120
-"""Timeout for a line of a participant, s."""
-ANSWER_S = 40
-"""Timeout of a prober for a response, s."""
 LEASE = """<?xml version="1.0" encoding="UTF-8"?>
 <profiles xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
   <participant profile_name="lease" is_default_profile="true"><rtps><builtin><discovery_config>
@@ -58,17 +50,8 @@ LEASE = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
-class NoResponse(TimeoutError):
-    """A service that did not respond to a prober."""
-
-    def __init__(self, service: str):
-        """Keeps the name of the service."""
-        super().__init__(f"{service} did not respond within {ANSWER_S} s")
-        self.service = service
-
-
-class Participant:
-    """Process that runs this file, terminated by its process id."""
+class Participant(LineProcess):
+    """Process that runs this file."""
 
     def __init__(
         self,
@@ -81,21 +64,13 @@ class Participant:
         """Starts the process; `lease` is its lease duration in s, set with the announcement period by a profile in
         `folder`.
         """
-        env = {**os.environ, "ROS_DOMAIN_ID": str(domain_id)}
+        env = {"ROS_DOMAIN_ID": str(domain_id)}
         if lease is not None:
-            assert folder is not None
             profile = folder / f"lease_{lease}_{announces_s}.xml"
             seconds, nanoseconds = divmod(round(announces_s * 1e9), 1_000_000_000)
             profile.write_text(LEASE.format(lease=lease, seconds=seconds, nanoseconds=nanoseconds))
             env["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(profile)
-        self._process = subprocess.Popen(
-            [sys.executable, "-X", "faulthandler", __file__, *map(str, words)],
-            env=env,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            preexec_fn=die_with_parent,
-        )
+        super().__init__(__file__, *words, env=env)
 
     def __enter__(self) -> Participant:
         """Waits until the process is ready and returns itself."""
@@ -106,67 +81,15 @@ class Participant:
             raise
         return self
 
-    def __exit__(self, *_: object) -> None:
-        """Kills the process."""
-        self.kill()
-
-    def read_line(self) -> str:
-        """Returns the next line of its output."""
-        out = self._process.stdout
-        assert out is not None
-        if not select.select([out], [], [], PATIENCE_S)[0]:
-            raise TimeoutError("no output of a participant")
-        line = out.readline()
-        if not line:
-            raise ChildProcessError(f"a participant ended with status {self._process.wait(PATIENCE_S)}")
-        return line.rstrip("\n")
-
     def stamps(self) -> np.ndarray:
         """Returns the stamps that a listener has received so far, ns."""
-        assert self._process.stdin is not None
-        self._process.stdin.write("\n")
-        self._process.stdin.flush()
+        self.go_on()
         return np.array(json.loads(self.read_line()), dtype=np.int64)
-
-    def latencies_ms(self, calls: int) -> list[float]:
-        """Returns the latencies of a prober's services, medians of this number of calls of each."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(f"{calls}\n")
-        self._process.stdin.flush()
-        reported = json.loads(self.read_line())
-        if isinstance(reported, str):
-            raise NoResponse(reported)
-        return reported
-
-    def go_on(self) -> None:
-        """Starts the transmission of a sender."""
-        assert self._process.stdin is not None
-        self._process.stdin.write("\n")
-        self._process.stdin.flush()
-
-    def stop(self) -> None:
-        """Sends SIGSTOP."""
-        self._process.send_signal(signal.SIGSTOP)
-
-    def resume(self) -> None:
-        """Sends SIGCONT."""
-        self._process.send_signal(signal.SIGCONT)
 
     def leave(self) -> None:
         """Lets a sink leave the graph regularly."""
         self.go_on()
-        self._process.wait(PATIENCE_S)
-
-    def kill(self) -> None:
-        """Sends SIGKILL; has no effect when called again."""
-        self._process.kill()
-        self._process.wait(PATIENCE_S)
-        for end in (self._process.stdin, self._process.stdout):
-            if end is not None and not end.closed:
-                try:
-                    end.close()
-                except BrokenPipeError:
-                    pass
+        self.wait()
 
 
 def long_trajectory(points: int, joints: tuple[str, str] = ("y", "z")) -> bytes:
@@ -251,41 +174,20 @@ def sink(node: Any, depth: int) -> None:
     sys.stdin.readline()
 
 
-def echo(node: Any, service: str) -> None:
-    """Responds at once, with a constant response."""
-    node.create_service(GetParameters, service, lambda _, response: response)
+def once(node: Any, name: str, durability: str, poll_s: float, keep_alive_s: float) -> None:
+    """Publishes a trajectory of a joint as soon as psec is matched."""
+    is_kept = durability == "transient_local"
+    profile = QoSProfile(
+        depth=1 if is_kept else 10,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if is_kept else DurabilityPolicy.VOLATILE,
+    )
+    psec = node.create_publisher(JointTrajectory, "/psec", profile)
+    while psec.get_subscription_count() == 0:
+        time.sleep(poll_s)
+    psec.publish(JointTrajectory(joint_names=[name], points=[JointTrajectoryPoint(positions=[0.0])]))
     print(READY, flush=True)
-    rclpy.spin(node)
-
-
-def probe(node: Any, services: tuple[str, str]) -> None:
-    """Calls two services alternately."""
-    clients = [node.create_client(GetParameters, service) for service in services]
-    for client in clients:
-        if not client.wait_for_service(PATIENCE_S):
-            sys.exit("no service")
-    time.sleep(SETTLE_S)
-    # In a thread that keeps spinning: rclpy's spin_until_future_complete takes longer with each call.
-    spins = spin(node)
-    print(READY, flush=True)
-
-    def took_ms(client: Any) -> float:
-        answered = threading.Event()
-        begin = time.perf_counter()
-        client.call_async(GetParameters.Request()).add_done_callback(lambda _: answered.set())
-        if not answered.wait(ANSWER_S):
-            if not spins.is_alive():
-                sys.exit("rclpy's executor ended")
-            raise NoResponse(client.srv_name)
-        return (time.perf_counter() - begin) * 1e3
-
-    for line in sys.stdin:
-        try:
-            took = [[took_ms(client) for client in clients] for _ in range(int(line))]
-            reported = np.median(took, axis=0).tolist()
-        except NoResponse as no_response:
-            reported = no_response.service
-        print(json.dumps(reported), flush=True)
+    time.sleep(keep_alive_s)
 
 
 def main() -> None:
@@ -300,10 +202,8 @@ def main() -> None:
             send(node, int(points))
         case ["sink", depth]:
             sink(node, int(depth))
-        case ["echo", service]:
-            echo(node, service)
-        case ["probe", first, second]:
-            probe(node, (first, second))
+        case ["once", name, durability, poll_s, keep_alive_s]:
+            once(node, name, durability, float(poll_s), float(keep_alive_s))
         case _:
             sys.exit(__doc__)
     rclpy.try_shutdown()

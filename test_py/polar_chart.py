@@ -42,24 +42,10 @@ def _draw(plot: PolarAxes, title: str, circle: Circle) -> None:
     # All lines are within the limits; clip paths and a background per plot would add a quarter to an SVG file.
     plot.patch.set_visible(False)
     # Black and one strong color, solid and dashed: readable in grayscale print.
-    plot.plot(
-        turn,
-        np.zeros_like(turn),
-        color="black",
-        linewidth=1.2,
-        linestyle="--",
-        label="programmed circle, R = 150 mm",
-        clip_on=False,
-    )
-    plot.plot(
-        circle.angle,
-        circle.deviation,
-        color="#b2182b",
-        linewidth=1.6,
-        label="simulated position",
-        clip_on=False,
-        gid=title.replace(" ", "-"),
-    )
+    nominal = {"color": "black", "linewidth": 1.2, "linestyle": "--", "label": "programmed circle, R = 150 mm"}
+    plot.plot(turn, np.zeros_like(turn), clip_on=False, **nominal)
+    simulated = {"color": "#b2182b", "linewidth": 1.6, "label": "simulated position", "gid": title.replace(" ", "-")}
+    plot.plot(circle.angle, circle.deviation, clip_on=False, **simulated)
     # The nominal circle has a radius of four grid steps, so that an inward deviation stays off the center.
     plot.set_rorigin(-6 * step)
     plot.set_rlim(-4 * step, 3 * step)

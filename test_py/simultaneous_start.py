@@ -1,7 +1,7 @@
 """Nodes and an rclpy process whose participants are created at the same time.
 
-`Trial` starts both and compares the endpoints that the process discovers with those of `expected_endpoints`. The tool
-`tools/measure_simultaneous_start.py` runs many trials, a test a few. The process is this file as a program:
+`Trial` starts both and compares the endpoints that the process discovers with those of `expected_endpoints`.
+`tools/measure.py simultaneous-start` runs many trials, a test a few. The process is this file as a program:
 
     python test_py/simultaneous_start.py
 
@@ -13,23 +13,20 @@ from __future__ import annotations
 
 import json
 import os
-import select
 import socket
-import subprocess
 import sys
 import time
 from collections import Counter
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from node_process import DomainId, Node, die_with_parent, separate_output
+from line_process import LineProcess
+from node_process import DomainId, Node, separate_output
 
 RUSTDDS = bytes([0x01, 0x12])
 """Vendor id of the nodes, in front of their GUIDs."""
 PORT_TIMEOUT_S = 30.0
 """Timeout for the first participant of the nodes, s."""
-PATIENCE_S = 60.0
-"""Timeout for a line of the process beyond that of the discovery, s."""
 TIMEOUT_S = 15.0
 """Time after which undiscovered endpoints count as lost, s: more than the 10 s between two announcements of a node."""
 SETTLE_S = 2.0
@@ -44,8 +41,6 @@ class Discovered:
     """Number of endpoints by participant of a node."""
     publishing: int
     """Number of nodes of which a sample of joint_states arrived."""
-    seconds: float
-    """Time from its participant to the last endpoint or the timeout, s."""
 
 
 @dataclass
@@ -56,21 +51,17 @@ class Trial:
     delay: float
     expected: int
     """Endpoints of a node."""
-    timeout: float = TIMEOUT_S
-    arguments: list[str] = field(default_factory=list)
-    """ROS arguments of each node."""
 
     def run(self) -> Discovered:
         """Runs the trial."""
         domain = DomainId()
         try:
             with ExitStack() as stack:
-                observer = stack.enter_context(Observer())
-                observer.send(domain.value, self.nodes, self.delay, self.expected, self.timeout)
+                observer = stack.enter_context(observing())
+                observer.go_on(domain.value, self.nodes, self.delay, self.expected, TIMEOUT_S)
                 for number in range(self.nodes):
-                    args = ["-r", f"__ns:=/n{number}", *self.arguments]
-                    stack.enter_context(Node(args, domain_id=domain.value))
-                return observer.receive(self.timeout)
+                    stack.enter_context(Node(["-r", f"__ns:=/n{number}"], domain_id=domain.value))
+                return discovered_by(observer)
         finally:
             domain.release()
 
@@ -88,49 +79,24 @@ def expected_endpoints() -> int:
     """Returns the number of endpoints of a node, as discovered by a process that starts after it."""
     domain = DomainId()
     try:
-        with Observer() as observer, Node(["-r", "__ns:=/n0"], domain_id=domain.value):
-            observer.send(domain.value, 1, SETTLE_S, 0, SETTLE_S)
-            [count] = observer.receive(SETTLE_S).endpoints.values()
+        with observing() as observer, Node(["-r", "__ns:=/n0"], domain_id=domain.value):
+            observer.go_on(domain.value, 1, SETTLE_S, 0, SETTLE_S)
+            [count] = discovered_by(observer).endpoints.values()
             return count
     finally:
         domain.release()
 
 
-class Observer:
-    """Process with rclpy loaded, whose participant has not been created yet."""
+def observing() -> LineProcess:
+    """Starts the process and waits until rclpy is loaded; its participant has not been created yet."""
+    observer = LineProcess(__file__)
+    observer.read_line()
+    return observer
 
-    def __enter__(self) -> Observer:
-        """Starts the process and waits until rclpy is loaded."""
-        command = [sys.executable, __file__]
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, preexec_fn=die_with_parent
-        )
-        self._read(PATIENCE_S)
-        return self
 
-    def __exit__(self, *_: object) -> None:
-        """Kills the process."""
-        self._process.kill()
-        self._process.communicate()
-
-    def send(self, *words: float) -> None:
-        """Sends the line that starts the observation."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(" ".join(map(str, words)) + "\n")
-        self._process.stdin.flush()
-
-    def receive(self, timeout: float) -> Discovered:
-        """Returns the result of the observation."""
-        return Discovered(**json.loads(self._read(PORT_TIMEOUT_S + timeout + PATIENCE_S)))
-
-    def _read(self, timeout: float) -> str:
-        assert self._process.stdout is not None
-        if not select.select([self._process.stdout], [], [], timeout)[0]:
-            raise TimeoutError("no output of the observer")
-        line = self._process.stdout.readline()
-        if not line:
-            raise ChildProcessError(f"the observer ended with status {self._process.wait(PATIENCE_S)}")
-        return line
+def discovered_by(observer: LineProcess) -> Discovered:
+    """Returns the result of the observation."""
+    return Discovered(**json.loads(observer.read_line()))
 
 
 # ---------------------------------------------------------------------------------------------------- the process
@@ -192,8 +158,7 @@ def main() -> None:
         next_poll = time.monotonic() + 0.1
         while (left := next_poll - time.monotonic()) > 0:
             rclpy.spin_once(node, timeout_sec=left)
-    seconds = time.monotonic() - began
-    print(json.dumps({"endpoints": discovered(), "publishing": len(publishing), "seconds": seconds}), flush=True)
+    print(json.dumps({"endpoints": discovered(), "publishing": len(publishing)}), flush=True)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import glob
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -60,33 +61,21 @@ def messages() -> None:
 
 def trajectory() -> None:
     """Starts the installed node, submits a trajectory and waits for its result."""
-    # Not at the top: it imports rclpy, whose absence must be a failure in the result file.
-    from node_process import DomainId, die_with_parent
+    # Not at the top: the module is not installed.
+    from node_process import Node
 
     # Not the user's domain, nor one of another test; nothing leaves the machine.
-    domain = DomainId()
-    os.environ["ROS_DOMAIN_ID"] = str(domain.value)
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     for variable in ("ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY"):
         os.environ.pop(variable, None)
-    program = PROGRAMS / "virtual_axes_node"
-    try:
-        with subprocess.Popen([program], stdin=subprocess.DEVNULL, preexec_fn=die_with_parent) as node:
-            try:
-                submit(node)
-            finally:
-                node.terminate()
-                try:
-                    status = node.wait(STOP_S)
-                except subprocess.TimeoutExpired:
-                    node.kill()
-                    raise
-    finally:
-        domain.release()
+    with Node(binary=PROGRAMS / "virtual_axes_node") as node:
+        os.environ["ROS_DOMAIN_ID"] = str(node.domain_id)
+        submit(node.poll)
+        status = node.stop(signal.SIGTERM, STOP_S)
     assert status == 0, f"the node ended with status {status}"
 
 
-def submit(node: subprocess.Popen[bytes]) -> None:
+def submit(poll: Callable[[], int | None]) -> None:
     """Submits a motion of X over the topic psec and checks the first result."""
     import rclpy
     from builtin_interfaces.msg import Duration
@@ -103,7 +92,7 @@ def submit(node: subprocess.Popen[bytes]) -> None:
         def wait(until: Callable[[], object], limit: float, what: str) -> None:
             end = time.monotonic() + limit
             while not until():
-                assert node.poll() is None, f"the node ended with status {node.returncode}"
+                assert poll() is None, f"the node ended with status {poll()}"
                 assert time.monotonic() < end, f"no {what} within {limit:g} s"
                 rclpy.spin_once(client, timeout_sec=0.1)
 

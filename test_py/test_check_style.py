@@ -44,15 +44,11 @@ def test_correct_text_is_accepted(tmp_path: Path) -> None:
     ("file", "text", "message"),
     [
         ("src/lib.rs", "/// What a gain is limited to.\npub struct Other;\n", "src/lib.rs:1: opening of a doc comment"),
-        ("src/lib.rs", "//! Whether a gain is limited.\n", "src/lib.rs:1: opening of a doc comment"),
         ("src/lib.rs", "/// The limit.\n#[must_use]\npub fn other() {}\n", "third-person verb"),
         ("src/lib.rs", "// Nobody subscribes.\n", "banned word 'Nobody'"),
-        ("docs/page.md", "A subscriber is told of it.\n", "docs/page.md:1: banned word 'is told'"),
         ("test_py/test_x.py", '"""A set-point."""\n', "banned word 'set-point'"),
-        ("config/machine.yaml", "# Colour of the table\n", "American spelling 'Colour'"),
         ("README.md", "The signals are synchronised.\n", "American spelling 'synchronised'"),
         ("crates/core/src/lib.rs", "/// Gain.\npub enum GainLimit {}\n", "type name GainLimit exists in"),
-        ("crates/core/src/lib.rs", "pub(crate) trait GainLimit {}\n", "type name GainLimit exists in"),
         ("ARCHITECTURE.md", "The limit is in `src/missing.rs`.\n", "src/missing.rs does not exist"),
     ],
 )

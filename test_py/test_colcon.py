@@ -16,6 +16,8 @@ from fmpy.validation import validate_fmu
 from documentation.place import Place
 from node_process import node_binary
 
+pytestmark = pytest.mark.extended
+
 PREFIX = Path(sys.prefix)
 PROGRAMS = ("virtual_axes", "virtual_axes_node")
 

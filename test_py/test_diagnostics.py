@@ -103,4 +103,5 @@ def test_endpoints_are_counted_and_memory_is_reported(real: AxesClient):
     real.wait_for(lambda: count() >= before + 25, 20, "20 subscriptions and 5 publishers counted")
     after = real.next_status()
     assert int(after["endpoints_discovered"]) == before + 25
+    real.wait_for(lambda: int(real.next_status()["endpoints_departed"]) >= 25, 20, "25 departed endpoints counted")
     assert abs(float(after["memory_mb"]) - own_mb(real.process.pid)) < 5.0

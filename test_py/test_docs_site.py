@@ -14,6 +14,8 @@ import pytest
 
 from browser import Browser, find_browser
 
+pytestmark = pytest.mark.extended
+
 SITE = Path(os.environ.get("VIRTUAL_AXES_SITE") or Path(__file__).resolve().parent.parent / ".build/docs/html")
 VIEWS = [(scheme, width) for scheme in ("light", "dark") for width in (1280, 390)]
 """Color schemes, and the widths in pixels of a desktop screen and a telephone."""

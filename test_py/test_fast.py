@@ -1,4 +1,4 @@
-"""Mode `time: fast`: its /clock, the common clock of several machines, and slow subscribers."""
+"""Mode `time: fast`: its /clock, a machine that follows it, a second publisher, and slow subscribers."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from contextlib import ExitStack
 import numpy as np
 import pytest
 import rclpy
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.context import Context
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
@@ -54,39 +55,11 @@ def test_an_idle_fast_node_runs_at_wall_clock_rate(start: Callable[..., AxesClie
     assert 0 < shown < 1.5 * passed
 
 
-def node(stack: ExitStack, name: str, domain: DomainId, *ros_args: str) -> Node:
-    """Starts the process of a machine with its own name in a shared domain."""
-    arguments = ["-r", f"__ns:=/{name}", *(ros_args or ("-p", "time:=fast"))]
-    return stack.enter_context(Node(arguments, name=f"/{name}/virtual_axes", domain_id=domain.value))
-
-
 def machine(stack: ExitStack, name: str, domain: DomainId, *ros_args: str) -> AxesClient:
-    """Starts a machine in a shared domain and returns its AxesClient."""
-    return stack.enter_context(AxesClient(process=node(stack, name, domain, *ros_args)))
-
-
-def wait_for_topics(process: Node) -> None:
-    """Waits until all topics of a node exist: docs/internals/middleware.md, "Processes that start at the same time"."""
-    deadline = time.monotonic() + 20
-    while "Ctrl-C" not in process.output():
-        assert time.monotonic() < deadline, process.output()
-        time.sleep(0.02)
-
-
-class Ticks:
-    """Messages on /clock, in order of arrival."""
-
-    def __init__(self, drive: AxesClient):
-        """Subscribes with the node of a AxesClient."""
-        self.shown: list[int] = []
-        self._drive = drive
-        drive.node.create_subscription(Clock, "/clock", lambda message: self.shown.append(to_ns(message.clock)), DEEP)
-        drive.wait_for(lambda: self.shown, 10, "tick of the clock")
-
-    def since(self, begin: int) -> np.ndarray:
-        """Returns the messages from index `begin` on, after at least one has arrived."""
-        self._drive.wait_for(lambda: len(self.shown) > begin + 10, 10, "ticks of the clock")
-        return np.array(self.shown[begin:])
+    """Starts a machine with its own name in a shared domain and returns its AxesClient."""
+    arguments = ["-r", f"__ns:=/{name}", *(ros_args or ("-p", "time:=fast"))]
+    process = stack.enter_context(Node(arguments, name=f"/{name}/virtual_axes", domain_id=domain.value))
+    return stack.enter_context(AxesClient(process=process))
 
 
 @pytest.fixture
@@ -98,12 +71,6 @@ def shared() -> Iterator[tuple[ExitStack, DomainId]]:
         yield stack, domain
 
 
-def leads(drive: AxesClient) -> bool:
-    """Returns true if a machine publishes the clock, by its log."""
-    lines = [line for line in drive.process.output().splitlines() if "/clock:" in line]
-    return bool(lines) and lines[-1].endswith("publishing it")
-
-
 def assert_unbroken(drive: AxesClient, begin: int, end: int) -> None:
     """Asserts that all position cycles between two times exist, ns."""
     drive.wait_until(end // TSP_NS * TSP_NS, 30)
@@ -111,75 +78,42 @@ def assert_unbroken(drive: AxesClient, begin: int, end: int) -> None:
     assert np.array_equal(stamps, np.arange(-(-begin // TSP_NS) * TSP_NS, end + 1, TSP_NS))
 
 
-def test_the_second_machine_follows_the_first_and_then_publishes(shared: tuple[ExitStack, DomainId]):
-    """Two machines and a third that only follows have one clock, which never goes back."""
+def test_a_machine_follows_the_clock_of_another(shared: tuple[ExitStack, DomainId]):
+    """A machine with use_sim_time computes every position cycle of one in `fast`, which has the only clock."""
     stack, domain = shared
-    with ExitStack() as first_life:
-        first = machine(first_life, "first", domain)
-        second = machine(stack, "second", domain)
-        third = machine(stack, "third", domain, "-p", "use_sim_time:=true")
-        ticks = Ticks(third)
-        assert leads(first) and not leads(second)
-        begin = max(drive.now() for drive in (first, second, third))
-        # The first machine has a command and runs as fast as possible; the others follow.
-        slow = second.accept(joint_trajectory(["y"], [0.0, 1.0], [[0.0], [0.1]]))
-        recording = first.run(joint_trajectory(["x"], [0.0, 2.0], [[0.0], [0.3]]))
-        assert second.end(slow.sequence_number, 30).status == TrajectoryResult.COMPLETED
-        for drive in (first, second, third):
-            assert_unbroken(drive, begin, recording.joints.stamp[-1])
-        # While the first machine is idle, a trajectory of the second runs at wall-clock rate.
-        began = time.monotonic()
-        second.run(joint_trajectory(["y"], [0.0, 0.6], [[0.1], [0.1]]))
-        assert time.monotonic() - began > 0.4
-        before = second.now()
-    count = len(ticks.shown)
-    second.wait_for(lambda: leads(second), 10, "second machine that publishes the clock")
-    second.run(joint_trajectory(["y"], [0.0, 1.0], [[0.1], [0.0]]))
-    ticks.since(count)
-    shown = np.array(ticks.shown)
-    assert np.all(np.diff(shown) > 0), "the clock never goes back or repeats"
-    for drive in (second, third):
-        assert_unbroken(drive, before, second.now() - NANOSECONDS // 10)
-    assert not any("jumped" in drive.process.output() for drive in (second, third))
+    first = machine(stack, "first", domain)
+    second = machine(stack, "second", domain, "-p", "use_sim_time:=true")
+    begin = max(drive.now() for drive in (first, second))
+    slow = second.accept(joint_trajectory(["y"], [0.0, 1.0], [[0.0], [0.1]]))
+    recording = first.run(joint_trajectory(["x"], [0.0, 2.0], [[0.0], [0.3]]))
+    assert second.end(slow.sequence_number, 30).status == TrajectoryResult.COMPLETED
+    for drive in (first, second):
+        assert_unbroken(drive, begin, recording.joints.stamp[-1])
+    assert "jumped" not in second.process.output()
+    assert first.next_status()["other_clock_publishers"] == "0"
 
 
-def test_of_machines_that_start_together_one_leads(shared: tuple[ExitStack, DomainId]):
-    """The ids of the machines decide which one publishes."""
-    stack, domain = shared
-    processes = [node(stack, name, domain) for name in ("left", "right")]
-    for process in processes:
-        wait_for_topics(process)
-    both = [stack.enter_context(AxesClient(process=process)) for process in processes]
-    both[0].wait_for(lambda: sum(map(leads, both)) == 1, 5, "one machine that publishes the clock")
-    ticks = Ticks(both[0])
-    count = len(ticks.shown)
-    time.sleep(0.3)
-    assert np.all(np.diff(ticks.since(count)) > 0)
-    assert sum(map(leads, both)) == 1
-
-
-def test_an_external_clock_is_followed(start: Callable[..., AxesClient]):
-    """Another publisher of /clock has priority; after it has left, the machine continues from its own time."""
+def test_a_second_publisher_of_the_clock_is_an_error(start: Callable[..., AxesClient]):
+    """It is logged once with the name of its node, shown in the diagnostics while it exists, and not followed."""
     drive = start("-p", "time:=fast")
-    ticks = Ticks(drive)
-    begin = -(-(drive.now() + 2 * NANOSECONDS) // TSP_NS) * TSP_NS
-    other = SimClock(drive, begin)
-    drive.wait_for(lambda: "another node publishes it" in drive.process.output(), 10, "log of the other clock")
-    other.reach(begin)
-    count = len(ticks.shown)
-    times, position = swing(0.6)
-    sent = drive.send(joint_trajectory(["x"], times, position))
-    drive.decision(sent)
-    time.sleep(0.2)
-    assert drive.now() == begin, "another clock has advanced"
-    other.advance(1.0, 0.05)
-    assert drive.end(sent, 5).status == TrajectoryResult.COMPLETED
-    own = set(range(begin, other.now + 1, TSP_NS)) - set(ticks.shown[:count])
-    published = len(ticks.shown) - count
-    assert published <= 21 < len(own), "the machine no longer publishes"
+    begin = drive.now()
+    other = SimClock(drive, begin + 3600 * NANOSECONDS)
+    line = f"/clock: node {drive.node.get_fully_qualified_name()} publishes it, too"
+    drive.wait_for(lambda: line in drive.process.output(), 10, "error of the second clock")
+    assert "use_sim_time:=true" in drive.process.output()
+
+    def status_with(count: str) -> DiagnosticStatus | None:
+        found = [array.status[0] for array in drive.diagnostics()[-1:]]
+        return next((s for s in found if status_values(s)["other_clock_publishers"] == count), None)
+
+    status = drive.wait_for(lambda: status_with("1"), 5, "diagnostics of the second clock")
+    assert status.level == DiagnosticStatus.ERROR and "/clock" in status.message
+    other.set(other.now)
+    drive.run(joint_trajectory(["x"], *swing(0.6)))
+    assert drive.now() < begin + 1800 * NANOSECONDS, "the other clock is not followed"
+    assert drive.process.output().count("publishes it, too") == 1
     other.close()
-    drive.wait_for(lambda: drive.now() > other.now + NANOSECONDS // 10, 10, "own clock")
-    assert_unbroken(drive, begin, drive.now() - NANOSECONDS // 20)
+    drive.wait_for(lambda: status_with("0"), 5, "diagnostics after the end of the second clock")
 
 
 def stalled_at(drive: AxesClient, timeout: float = 60.0) -> int:

@@ -7,11 +7,15 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+import rclpy
 from control_msgs.msg import JointTrajectoryControllerState, SpeedScalingFactor
+from rclpy.context import Context
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 from virtual_axes.msg import TrajectoryResult as R
 
 from motion import TSP, go_home, swing
+from node_process import DomainId, Node
 from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, to_ns
 
 ACCELERATION, JERK = 2.5, 50.0
@@ -181,3 +185,27 @@ def test_an_invalid_override_is_ignored_with_a_warning(start: Callable[..., Axes
     drive.wait_for(lambda: text in drive.process.output(), 10, "warning")
     drive.wait_until(drive.now() + 10 * TSP_NS, 10)
     assert feed.rates[-1][1] == 0.5
+
+
+def test_a_latched_feed_override_is_received_at_the_start() -> None:
+    """As joint_trajectory_controller, which subscribes with transient-local durability."""
+    domain = DomainId()
+    context = Context()
+    try:
+        rclpy.init(context=context, domain_id=domain.value)
+        pendant = rclpy.create_node("pendant", context=context)
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        publisher = pendant.create_publisher(SpeedScalingFactor, "/virtual_axes/speed_scaling_input", latched)
+        publisher.publish(SpeedScalingFactor(factor=0.25))
+        with Node(["-p", "time:=fast"], domain_id=domain.value) as process, AxesClient(process=process) as drive:
+            feed = Feed(drive)
+            feed.wait_for_rate(0.25)
+            # Another publisher, without durability, and the first one again.
+            feed.publish(0.5)
+            feed.wait_for_rate(0.5)
+            publisher.publish(SpeedScalingFactor(factor=0.75))
+            feed.wait_for_rate(0.75)
+        pendant.destroy_node()
+    finally:
+        rclpy.try_shutdown(context=context)
+        domain.release()

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import signal
 
+from control_msgs.msg import SpeedScalingFactor
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
 
 from interface import interfaces
 from node_process import Node
@@ -54,6 +57,21 @@ def test_appears_and_disappears_within_two_seconds():
             drive.wait_for(lambda: not drive.is_in_graph() and not left(), 2, "end of the node")
     finally:
         process.__exit__()
+
+
+def test_incompatible_qos_is_logged_with_the_policy(fast: AxesClient):
+    """Both directions; a volatile publisher of a topic that is also received latched is no fault."""
+    best_effort = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    fast.in_executor(lambda: fast.node.create_publisher(JointTrajectory, "/psec", best_effort))
+    fast.in_executor(lambda: fast.node.create_subscription(JointState, "/joint_states", lambda _: None, latched))
+    fast.in_executor(lambda: fast.node.create_publisher(SpeedScalingFactor, f"{fast.target}/speed_scaling_input", 10))
+    for line in (
+        f"/psec: the QoS of the publisher of node /{fast.name} does not match (reliability)",
+        f"/joint_states: the QoS of the subscription of node /{fast.name} does not match (durability)",
+    ):
+        fast.wait_for(lambda: line in fast.process.output(), 5, line)
+    assert "speed_scaling_input: the QoS" not in fast.process.output()
 
 
 def test_type_hash_is_not_sent(fast: AxesClient):

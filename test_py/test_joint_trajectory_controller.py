@@ -19,7 +19,7 @@ from action import Follow, Result, goal, line
 from launch_graph import nodes
 from motion import go_home
 from node_process import Node, node_binary
-from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, to_ns, to_time
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, ParameterRejected, joint_trajectory, to_ns, to_time
 
 NAME = "joint_trajectory_controller"
 TOPIC = f"/{NAME}/joint_trajectory"
@@ -169,9 +169,6 @@ def test_parameters_are_accepted_under_their_names(drive: AxesClient) -> None:
             ["constraints.x.goal = -0.1", "must be 0 (no tolerance) or a positive number of m"],
         ),
         ("interpolation_method:=cubic", ["interpolation_method = cubic", "must be splines or none"]),
-        ("command_interfaces:=[velocity]", ["command_interfaces = [velocity]", "must be [position]"]),
-        ("allow_partial_joints_goal:=false", ["allow_partial_joints_goal = false", "must be true"]),
-        ("gains.x.p:=2.0", ["gains.x.p"]),
     ],
 )
 def test_other_values_and_parameters_are_rejected(parameter: str, words: list[str]) -> None:
@@ -180,6 +177,20 @@ def test_other_values_and_parameters_are_rejected(parameter: str, words: list[st
     )
     assert ended.returncode == 2
     assert all(word in ended.stderr for word in words), ended.stderr
+
+
+def test_values_of_a_controller_that_the_node_cannot_follow_are_ignored() -> None:
+    """A warning for each; at run time they are rejected."""
+    parameters = {
+        "command_interfaces:=[velocity]": "command_interfaces = [velocity]: must be [position]",
+        "allow_partial_joints_goal:=false": "allow_partial_joints_goal = false: must be true",
+        "gains.x.p:=2.0": "gains.x.p = 2: must be omitted",
+    }
+    arguments = [word for parameter in parameters for word in ("-p", parameter)]
+    with Node(arguments) as process, AxesClient(process=process) as axes:
+        assert [text for text in parameters.values() if f"-p: {text}" not in process.output()] == []
+        with pytest.raises(ParameterRejected, match="must be true: axes that a trajectory does not name continue"):
+            axes.set_parameters({"allow_partial_joints_goal": False})
 
 
 def test_tolerances_of_goals_have_their_meaning(drive: AxesClient) -> None:
@@ -229,8 +240,8 @@ def test_without_interpolation_the_setpoint_is_the_next_point() -> None:
         assert (far.status, far.code, far.point_index) == (R.REJECTED, R.SPEED, 1)
 
 
-def test_a_rotary_axis_counts_its_turns(drive: AxesClient) -> None:
-    """C is absolute: the setpoint is the angle with its turns, never the shortest way."""
+def test_a_continuous_axis_counts_its_turns(drive: AxesClient) -> None:
+    """C is absolute; a trajectory moves by the whole turns that bring its beginning to the axis."""
     turn = 2 * np.pi
     drive.run(line(["c"], [3.0], 4.0))
     # −3 rad is reached by 6 rad backwards, not by 0.28 rad ahead, and 3 + 2π by a whole turn ahead.
@@ -238,7 +249,15 @@ def test_a_rotary_axis_counts_its_turns(drive: AxesClient) -> None:
     assert np.all(np.diff(recording.states["psec", "c"]) <= 0)
     recording = drive.run(joint_trajectory(["c"], [0, 14], [-3.0, 3.0 + turn], [0, 0]), settle=1.0)
     assert recording.states["position", "c"][-1] == pytest.approx(3.0 + turn, abs=1e-4)
-    # A planner that wraps to ±π starts a turn away.
-    wrapped = drive.decision(drive.send(joint_trajectory(["c"], [0, 1], [3.0, 3.1], [0, 0])))
-    assert (wrapped.status, wrapped.code, wrapped.joint) == (R.REJECTED, R.JUMP, "c")
-    assert wrapped.value == pytest.approx(turn, abs=1e-3)
+    # A planner that wraps to ±π begins a turn away; another counts from any turn.
+    for begin, turns in [(3.0, 1), (3.1 - 5 * turn, 6)]:
+        recording = drive.run(joint_trajectory(["c"], [0, 1], [begin, begin + 0.1], [0, 0]), settle=1.0)
+        assert recording.states["psec", "c"][-1] == pytest.approx(begin + 0.1 + turns * turn, abs=1e-12)
+    # A later first point is an absolute angle. A beginning between turns is a jump.
+    recording = drive.run(joint_trajectory(["c"], [12], [3.0], [0]), settle=1.0)
+    assert recording.states["psec", "c"][-1] == 3.0
+    far = drive.decision(drive.send(joint_trajectory(["c"], [0, 1], [turn, turn], [0, 0])))
+    assert (far.status, far.code, far.joint) == (R.REJECTED, R.JUMP, "c")
+    assert far.value == pytest.approx(3.0, abs=1e-3)
+    # A linear axis has no turns.
+    assert drive.decision(drive.send(joint_trajectory(["x"], [0, 1], [turn, turn], [0, 0]))).status == R.REJECTED

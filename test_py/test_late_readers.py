@@ -17,16 +17,18 @@ from sensor_msgs.msg import JointState
 from node_process import Node, own_mb
 from virtual_axes_py.ros import DEEP_QOS, TSP_NS, AxesClient, joint_trajectory, stamp_of
 
+pytestmark = pytest.mark.extended
+
 TOPIC = "/joint_states"
 MANY = 1 << 19
-"""Samples after which a topic gets a new DataWriter (src/ros/writer_rotation.rs)."""
+"""Samples after which a topic gets a new DataWriter (crates/dds/src/defects/writer_rotation.rs)."""
 MORE = 5_000
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 JOINING = 200
 """Maximum loss while a reader is being matched."""
 LATE = 3
 SETTLED_S = 5
-"""Time without a new participant before a topic gets its next writer, s (src/ros/remote_participants.rs)."""
+"""Time without a new participant before a topic gets its next writer, s (`returned_participants.rs` of crates/dds)."""
 JOIN_S = 1
 """Lifetime of a joining participant, s."""
 MAY_GROW_MB = 1.5

@@ -99,8 +99,10 @@ def test_use_sim_time_is_time_sim(file: str):
     for node in found["virtual_axes_node"] + found["robot_state_publisher"]:
         assert node.values["use_sim_time"] is True and "time" not in node.values
     for time in ("real", "fast"):
-        for node in by_executable(nodes(file, use_sim_time="false", time=time))["virtual_axes_node"]:
-            assert node.values["time"] == time and "use_sim_time" not in node.values
+        first, *others = by_executable(nodes(file, use_sim_time="false", time=time))["virtual_axes_node"]
+        assert first.values["time"] == time and "use_sim_time" not in first.values
+        # Only one node may publish the clock.
+        assert all(other.values.get("use_sim_time", False) == (time == "fast") for other in others)
 
 
 @pytest.mark.parametrize("file", [ONE, TWO])
@@ -117,6 +119,15 @@ def test_rviz_without_its_package_is_rejected(file: str, monkeypatch: pytest.Mon
     monkeypatch.delitem(substitutions.PROGRAMS, ("rviz2", "rviz2"))
     with pytest.raises(RuntimeError, match=r"ros-\$ROS_DISTRO-rviz2 ros-\$ROS_DISTRO-rviz-default-plugins"):
         nodes(file, rviz="true", robot_state_publisher="false")
+
+
+@pytest.mark.parametrize("file", [ONE, TWO])
+def test_without_robot_state_publisher_nothing_is_started(file: str, monkeypatch: pytest.MonkeyPatch):
+    """The message names the Debian package and the argument that omits the model, with which the node starts."""
+    monkeypatch.delitem(substitutions.PROGRAMS, ("robot_state_publisher", "robot_state_publisher"))
+    with pytest.raises(RuntimeError, match=r"ros-\$ROS_DISTRO-robot-state-publisher.*robot_state_publisher:=false"):
+        nodes(file)
+    assert by_executable(nodes(file, robot_state_publisher="false")).keys() == {"virtual_axes_node"}
 
 
 @pytest.mark.parametrize(
@@ -150,7 +161,8 @@ def test_a_machine_without_kinematics_is_rejected_unless_the_model_is_off(tmp_pa
 
 def test_without_the_command_the_built_in_model_is_used(monkeypatch: pytest.MonkeyPatch):
     """A log message reports the fallback; another machine is rejected."""
-    monkeypatch.setattr(substitutions, "PROGRAMS", {})
+    only = {key: path for key, path in substitutions.PROGRAMS.items() if key[0] == "robot_state_publisher"}
+    monkeypatch.setattr(substitutions, "PROGRAMS", only)
     found = actions(ONE)
     [message] = [action.msg for action in found if isinstance(action, LogInfo)]
     assert "mikron_ucp710.urdf" in message

@@ -9,6 +9,8 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
+pytestmark = pytest.mark.extended
+
 FOLDER = Path(__file__).resolve().parent.parent / "docs/notebooks"
 PARAMETERS = {
     "tune-for-a-part": 'path = "corner-45"\ndesigns = 50\nmachines = 64',

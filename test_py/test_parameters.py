@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from rcl_interfaces.msg import ParameterType
 
 from motion import RATIO, TSP, go_home, start_swing
@@ -42,6 +44,37 @@ def test_every_parameter_is_described(real: AxesClient):
             ranges = [*descriptor.floating_point_range, *descriptor.integer_range]
             assert len(ranges) == 1, descriptor.name
             assert ranges[0].from_value < ranges[0].to_value, descriptor.name
+
+
+def dump(drive: AxesClient) -> dict[str, object]:
+    """Returns the parameters as `ros2 param dump` writes them: a mapping for each part of a name."""
+    names = sorted(drive.list_parameters())
+    values = drive.get_parameters(names)
+    tree: dict[str, object] = {}
+    for name in names:
+        *groups, last = name.split(".")
+        inner = tree
+        for group in groups:
+            inner = inner.setdefault(group, {})
+        value = values[name]
+        inner[last] = value if isinstance(value, (str, float, int, bool, type(None))) else list(value)
+    return {drive.target: {"ros__parameters": tree}}
+
+
+def test_a_dump_of_the_parameters_can_be_loaded(start: Callable[..., AxesClient], tmp_path: Path):
+    """Parameters without value are not declared until they are set."""
+    first = start("-p", "x.velocity_loop.gain:=4.25", "-p", "constraints.goal_time:=0.5", "-p", "publish_rate:=50.0")
+    assert "c.limits.travel_min_deg" not in first.list_parameters()
+    text = yaml.dump(dump(first), default_flow_style=False)
+    file = tmp_path / "dump.yaml"
+    file.write_text(text)
+    second = start("--params-file", str(file))
+    assert yaml.dump(dump(second), default_flow_style=False) == text
+    # Older nodes dumped parameters without value as null.
+    file.write_text(text.replace("    publish_rate: 50.0\n", "    publish_rate: null\n"))
+    third = start("--params-file", str(file))
+    assert third.get_parameters(["publish_rate"]) == {"publish_rate": 0.0}
+    assert "WARN" not in third.process.output()
 
 
 def test_values_are_those_of_the_default_machine(real: AxesClient):

@@ -38,7 +38,7 @@ def test_manager_and_controllers_start():
 
 def test_urdf_names_the_exported_class_and_every_axis():
     text, found = block()
-    assert len(URDF.from_xml_string(text).joints) == 7
+    assert len(URDF.from_xml_string(text).joints) == 8
     plugin = xml.parse(FOLDER / "virtual_axes_system.xml").getroot().find("class")
     assert plugin is not None and found.findtext("hardware/plugin") == plugin.get("name")
     source = (FOLDER / "src" / "virtual_axes_system.cpp").read_text()

@@ -181,7 +181,7 @@ def test_the_feed_override_of_a_goal_and_a_feed_hold(programs: Follow) -> None:
         (Goal(path="/no/such.nc"), Result.FILE_ERROR, "/no/such.nc: No such file or directory (os error 2)"),
         (Goal(path="/dev/zero"), Result.FILE_ERROR, "/dev/zero: is not a regular file"),
         (Goal(path="/"), Result.FILE_ERROR, "/: is not a regular file"),
-        (Goal(program="G1 X1 F100\nG41 X2\nM2\n"), Result.PROGRAM_ERROR, "program:2: G41 is not supported"),
+        (Goal(program="G1 X1 F100\nG12.1\nM2\n"), Result.PROGRAM_ERROR, "program:2: G12.1"),
         (Goal(program="G1 X1 F100\nG1 X2000\nM2\n"), Result.PROGRAM_ERROR, "program: line 2: x is at"),
         (
             Goal(program="G1 X1 F100\n", start_line=9),

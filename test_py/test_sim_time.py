@@ -242,6 +242,15 @@ def test_jumps_are_counted(clock: SimClock):
     assert any("the clock jumped" in array.status[0].message for array in drive.diagnostics()[-3:])
 
 
+def test_a_stamp_of_the_wall_clock_is_rejected(clock: SimClock):
+    """Such a trajectory would wait for decades."""
+    drive = clock.drive
+    motion = joint_trajectory(["y"], [0.0, 0.1], [[0.0], [0.0]], stamp=time.time_ns())
+    decision = drive.decision(drive.send(motion))
+    assert decision.status == TrajectoryResult.REJECTED
+    assert "use_sim_time" in decision.text
+
+
 def test_a_chunk_by_absolute_times_is_followed_by_the_clock(clock: SimClock):
     """The stamps of trajectories are times of the followed clock."""
     drive = clock.drive

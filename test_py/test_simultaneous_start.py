@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 
+import pytest
+
 from simultaneous_start import Trial, expected_endpoints
+
+pytestmark = pytest.mark.extended
 
 TRIALS = 9
 AT_ONCE = 3

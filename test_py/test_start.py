@@ -49,9 +49,20 @@ def test_an_integer_is_accepted_for_a_double(start: Callable[..., AxesClient]):
     assert drive.get_parameters(["x.velocity_loop.gain"]) == {"x.velocity_loop.gain": 4.0}
 
 
+def test_parameters_of_other_nodes_are_ignored(start: Callable[..., AxesClient], tmp_path: Path):
+    """As in rclcpp; a parameter in the section of this node must exist."""
+    shared = tmp_path / "shared.yaml"
+    shared.write_text("/**:\n  ros__parameters: {cell_name: hall_3, x.velocity_loop.gain: 4.0}\n")
+    foreign = ["-p", "foreign:=1", "-p", "start_type_description_service:=false"]
+    drive = start("--params-file", str(shared), *foreign)
+    assert drive.get_parameters(["x.velocity_loop.gain"]) == {"x.velocity_loop.gain": 4.0}
+    shared.write_text("virtual_axes:\n  ros__parameters: {cell_name: hall_3}\n")
+    assert "unknown parameter cell_name" in rejection("--params-file", str(shared))
+
+
 def test_the_linear_motor_machine_moves(start: Callable[..., AxesClient]):
     """Another machine file: other drives, another position cycle."""
-    file = next(path for path in CONFIG.glob("*.yaml") if "mikron" not in path.name)
+    file = CONFIG / "linear_motor_center.yaml"
     drive = start("--params-file", str(file), "-p", "time:=fast")
     drive.run(joint_trajectory(["x", "y"], [0.0, 1.0], [[0.0, 0.0], [0.1, -0.05]]), settle=0.5)
     position = drive.latest("position")
@@ -82,6 +93,24 @@ def test_publish_rate_decimates_the_grid(start: Callable[..., AxesClient]):
     recording = drive.run(joint_trajectory(["x"], [0.0, 0.6], [[0.0], [0.01]]))
     stamps = recording.joints.stamp
     assert set(stamps[1:] - stamps[:-1]) == {12_000_000}
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "remedy"),
+    [
+        ("ROS_DISCOVERY_SERVER", "127.0.0.1:11811", "ROS_STATIC_PEERS"),
+        ("RMW_IMPLEMENTATION", "rmw_zenoh_cpp", "rmw_fastrtps_cpp"),
+        ("FASTDDS_BUILTIN_TRANSPORTS", "LARGE_DATA", "UDPv4"),
+        ("FASTDDS_BUILTIN_TRANSPORTS", "SHM", "UDPv4"),
+    ],
+)
+def test_a_transport_that_the_node_does_not_have_causes_a_warning(
+    start: Callable[..., AxesClient], variable: str, value: str, remedy: str
+):
+    """One line, with the variable and what works instead."""
+    drive = start(env={variable: value})
+    [line] = [line for line in drive.process.output().splitlines() if variable in line]
+    assert "[WARN]" in line and f"{variable}={value} has no effect here" in line and remedy in line
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +14,10 @@ from node_process import DomainId, Node
 from two_hosts import CLIENT_ADDRESS, NODE_ADDRESS, Link, reason_to_skip
 
 SKIP = reason_to_skip()
-pytestmark = pytest.mark.skipif(SKIP is not None, reason=f"two hosts need network namespaces: {SKIP}")
+pytestmark = [
+    pytest.mark.extended,
+    pytest.mark.skipif(SKIP is not None, reason=f"two hosts need network namespaces: {SKIP}"),
+]
 
 POINTS = 100_000
 WATCH_S = 5.0
@@ -35,7 +39,7 @@ def steps(link: Link, count: int, *words: object, node_env: dict[str, str] | Non
     """Runs a client on the second host; returns the results of its steps."""
     with node_behind(link, **(node_env or {})) as node:
         with link.client(node.domain_id, node.name, *words, env=env) as client:
-            results = [client.read() for _ in range(count)]
+            results = [json.loads(client.read_line()) for _ in range(count)]
         print(f"\nloss {link.loss:.0%}: {results}")
         return results
 
@@ -68,12 +72,12 @@ def test_samples_arrive_again_after_the_link_was_down():
         node_behind(link) as node,
         link.client(node.domain_id, node.name, "silence", WATCH_S) as client,
     ):
-        client.read()
-        assert client.read()["missing"] == 0
+        client.read_line()
+        assert json.loads(client.read_line())["missing"] == 0
         link.set_up(False)
         time.sleep(30.0)
         link.set_up(True)
-        client.proceed()
-        after = client.read()
+        client.go_on()
+        after = json.loads(client.read_line())
         print(f"\n{after}")
         assert after["missing"] == 0 and after["received"] > 100

@@ -19,7 +19,8 @@ from node_process import node_binary
 from reference_kinematics import OFFSETS, tool_pose
 
 ROOT = Path(__file__).resolve().parent.parent
-MACHINES = ["mikron_ucp710", "linear_motor_center"]
+TWO_TABLES = ["mikron_ucp710", "linear_motor_center"]
+MACHINES = [*TWO_TABLES, "vmc", "hmc", "gantry_router", "bc_center", "fork_head"]
 
 
 def command(*arguments: str) -> str:
@@ -94,25 +95,28 @@ def test_limits_equal_the_machine_file(machine: str):
 
 @pytest.mark.parametrize("machine", MACHINES)
 def test_the_tool_in_the_workpiece_equals_the_kinematics(machine: str):
-    """URDF, `virtual_axes pose` and the documented equations at random joint positions, with all offsets."""
-    settings = [text for key, value in OFFSETS.items() for text in ("--set", f"kinematics.{key}_mm={value}")]
+    """URDF, `virtual_axes pose` and, for two tables, the documented equations, with all offsets."""
+    offsets = OFFSETS | {"pivot_b_x": 19.0, "pivot_b_z": 43.0}
+    settings = [text for key, value in offsets.items() for text in ("--set", f"kinematics.{key}_mm={value}")]
     robot = URDF.from_xml_string(command("urdf", "--machine", machine, *settings))
     assert robot.get_root() == "machine"
     random = np.random.default_rng(710)
-    names = ["x", "y", "z", "a", "c"]
-    trials = random.uniform([-0.3, -0.2, -0.2, -math.pi, -20.0], [0.3, 0.2, 0.2, math.pi, 20.0], (60, 5))
+    names = machine_file(machine)["joints"]
+    bounds = [{"x": 0.3, "y": 0.2, "z": 0.2, "a": math.pi, "b": math.pi, "c": 20.0}[name] for name in names]
+    trials = random.uniform(np.negative(bounds), bounds, (60, len(names)))
     positions = [f"--joints={','.join(f'{n}={v!r}' for n, v in zip(names, row))}" for row in trials.tolist()]
     poses = json.loads(command("pose", "--machine", machine, "--json", *settings, *positions))
     largest = 0.0
     for row, pose in zip(trials.tolist(), poses, strict=True):
         joints = dict(zip(names, row))
         seen = np.linalg.inv(frame(robot, "workpiece", joints)) @ frame(robot, "tool", joints)
-        tip, orientation = tool_pose(**joints)
         x, y, z, w = pose["orientation"]
         sine = math.sqrt(x * x + y * y + z * z)
-        turned = rotation(np.array([x, y, z]) / sine, 2 * math.atan2(sine, w))
+        turned = rotation(np.array([x, y, z]) / (sine or 1.0), 2 * math.atan2(sine, w))
         errors = [seen[:3, 3] - pose["tip"], seen[:3, 2] - pose["axis"], seen[:3, :3] - turned]
-        errors += [tip - pose["tip"], orientation[:, 2] - pose["axis"]]
+        if machine in TWO_TABLES:
+            tip, orientation = tool_pose(**joints)
+            errors += [tip - pose["tip"], orientation[:, 2] - pose["axis"]]
         largest = max(largest, *(np.abs(error).max() for error in errors))
     print(f"{machine}: largest difference {largest:.1e}")
     assert largest < 1e-9
@@ -142,5 +146,43 @@ def test_urdfdom_parses_it(machine: str, tmp_path: Path):
     command("urdf", "--machine", machine, "--out", str(path))
     answer = subprocess.run(["check_urdf", path], capture_output=True, text=True, timeout=20, check=False)
     assert answer.returncode == 0, answer.stdout + answer.stderr
-    assert "root Link: machine has 2 child(ren)" in answer.stdout
+    assert "root Link: machine has 3 child(ren)" in answer.stdout
     assert answer.stderr == ""
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_every_body_has_collision_shapes_and_inertia(machine: str):
+    """Gazebo drops links without inertia, and MoveIt plans through links without shapes; KDL wants none at the root."""
+    robot = URDF.from_xml_string(command("urdf", "--machine", machine))
+    assert robot.link_map[robot.get_root()].inertial is None
+    bodies = {name: link for name, link in robot.link_map.items() if link.visuals}
+    assert robot.link_map.keys() - bodies.keys() <= {"machine", "workpiece", "tool"}
+    for name, link in bodies.items():
+        shapes = [(shape.origin.xyz, shape.origin.rpy, vars(shape.geometry)) for shape in link.visuals]
+        assert [(shape.origin.xyz, shape.origin.rpy, vars(shape.geometry)) for shape in link.collisions] == shapes
+        inertia = link.inertial.inertia.to_matrix()
+        moments = np.linalg.eigvalsh(inertia)
+        # A rigid body: positive, and no moment is larger than the sum of the others.
+        assert moments[0] > 0 and moments[2] < moments[0] + moments[1], name
+        # The same by points at random in the shapes.
+        random = np.random.default_rng(1)
+        points, masses = [], []
+        for origin, (_, pitch, _), geometry in shapes:
+            if "size" in geometry:
+                cloud = random.uniform(-0.5, 0.5, (200_000, 3)) * geometry["size"]
+                mass = 1800 * np.prod(geometry["size"])
+            else:
+                radius, length = geometry["radius"], geometry["length"]
+                angle, share = random.uniform(0, 2 * math.pi, 200_000), np.sqrt(random.uniform(0, 1, 200_000))
+                x, y = radius * share * np.cos(angle), radius * share * np.sin(angle)
+                cloud = np.column_stack([x, y, random.uniform(-0.5, 0.5, 200_000) * length])
+                mass = 1800 * math.pi * radius**2 * length
+            points.append(cloud @ rotation(np.array([0.0, 1.0, 0.0]), pitch).T + origin)
+            masses.append(np.full(len(cloud), mass / len(cloud)))
+        cloud, weights = np.concatenate(points), np.concatenate(masses)
+        assert link.inertial.mass == pytest.approx(weights.sum(), rel=1e-9)
+        center = weights @ cloud / weights.sum()
+        assert link.inertial.origin.xyz == pytest.approx(center, abs=3e-3)
+        offsets = cloud - link.inertial.origin.xyz
+        sampled = np.eye(3) * (weights @ (offsets**2).sum(1)) - (offsets.T * weights) @ offsets
+        assert inertia == pytest.approx(sampled, abs=1e-2 * moments[2])

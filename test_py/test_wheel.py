@@ -148,7 +148,7 @@ def test_a_part_program_runs_as_by_the_command(machine: va.Machine) -> None:
         assert len(run.figures["part_program"]["worst_lines"]) == 10
         page = run.report()
         worst = run.figures["part_program"]["worst_lines"][0]
-        assert "Lines with the largest contour errors" in page and "Feed along the path" in page
+        assert "Lines with the largest contour errors" in page and "Feed (m/min)" in page
         assert f"{worst['contour_error_um']:.2f}" in page
     assert "part_program" not in machine.simulate(va.nc_program(program), figures="axes").figures
     with pytest.raises(ValueError, match="circle-diamond-square: is a part program; load it with nc_program"):
@@ -157,22 +157,22 @@ def test_a_part_program_runs_as_by_the_command(machine: va.Machine) -> None:
 
 def test_options_of_a_part_program_are_those_of_the_command(machine: va.Machine, tmp_path: Path) -> None:
     file = tmp_path / "part.nc"
-    file.write_text("G21 G90 G64 P0.05\nM110\nG1 X20 F6000\nG2 X30 Y10 I0 J10\nG1 Y20\nM2\n")
-    options = ["--ignore", "M110", "--chord-error-um", "2", "--centripetal-m-s2", "0.2"]
+    file.write_text("G21 G90 G64 P0.05\nM250\nG1 X20 F6000\nG2 X30 Y10 I0 J10\nG1 Y20\nM2\n")
+    options = ["--ignore", "M250", "--chord-error-um", "2", "--centripetal-m-s2", "0.2"]
     command = [COMMAND, "run", str(file), "--json", *options]
     done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=300)
     expected = json.loads(done.stdout)["runs"][0]
-    program = va.nc_program(str(file), ignore=["M110"], chord_error=2e-6, centripetal_acceleration=0.2)
-    note = f"{file}:2: M110 is ignored, 1 in all"
+    program = va.nc_program(str(file), ignore=["M250"], chord_error=2e-6, centripetal_acceleration=0.2)
+    note = f"{file}:2: M250 is ignored, 1 in all"
     assert f"note: {note}" in done.stderr
     for given in (program, pickle.loads(pickle.dumps(program))):
         with pytest.warns(UserWarning, match=re.escape(note)):
             figures = machine.simulate(given).figures
         assert figures["part_program"] == expected["part_program"]
     with pytest.warns(UserWarning, match=re.escape(note)):
-        free = machine.simulate(va.nc_program(str(file), ignore=[110])).figures["part_program"]
+        free = machine.simulate(va.nc_program(str(file), ignore=[250])).figures["part_program"]
     assert free["cycle_time_s"] < figures["part_program"]["cycle_time_s"]
-    with pytest.raises(ValueError, match="M110"):
+    with pytest.raises(ValueError, match="M250"):
         machine.simulate(va.nc_program(str(file)))
 
 
@@ -211,7 +211,7 @@ def test_options_of_a_part_program_are_those_of_the_command(machine: va.Machine,
         (lambda m: va.scenario("nothing"), ValueError, "nothing"),
         (lambda m: m.simulate(va.nc_program("/nowhere.nc")), ValueError, "/nowhere.nc"),
         (lambda m: va.nc_program("a.nc", feed_override=3.0), ValueError, "feed_override 3"),
-        (lambda m: va.nc_program("a.nc", ignore=["x"]), ValueError, 'ignore "x": must be an M code'),
+        (lambda m: va.nc_program("a.nc", ignore=["x"]), ValueError, 'ignore "x": x: must be a G or M code'),
         (lambda m: va.nc_program("a.nc", chord_error=0.0), ValueError, "chord_error 0: must be above 0"),
         (lambda m: va.nc_program("a.nc", centripetal_acceleration=-1.0), ValueError, "centripetal_acceleration -1"),
         (lambda m: va.sweep(m, [], va.scenario("ballbar"), threads=0), ValueError, "threads 0"),
@@ -327,6 +327,7 @@ def test_both_modules_can_be_imported_together(machine: va.Machine) -> None:
     assert DriveStates().get_fields_and_field_types() and machine.axes
 
 
+@pytest.mark.extended
 def test_the_wheel_is_small_and_runs_in_an_empty_environment(tmp_path: Path) -> None:
     wheels = list((ROOT / ".build/wheel").glob("virtual_axes_py-*.whl"))
     assert len(wheels) == 1 and wheels[0].stat().st_size < 15e6

@@ -21,6 +21,8 @@ from optuna.trial import TrialState
 import virtual_axes_py as va
 from virtual_axes_py import chunks, cluster
 
+pytestmark = pytest.mark.extended
+
 BOUNDS = {
     f"{axis}.position_loop.gpc.{key}": bounds
     for axis in "xy"

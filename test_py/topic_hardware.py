@@ -8,7 +8,6 @@ not in `position`, which is then shorter: such joints are last.
 
 from __future__ import annotations
 
-import heapq
 import math
 import random
 import time
@@ -55,8 +54,7 @@ class Network:
             if sent < silent_until:
                 continue
             arrivals += [(sent + late, index)] * copies
-        heapq.heapify(arrivals)
-        return [heapq.heappop(arrivals) for _ in range(len(arrivals))]
+        return sorted(arrivals)
 
 
 class TopicHardware:

@@ -13,25 +13,21 @@ It writes one line of JSON for each step. Needs root, iproute2 and iptables.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
-import select
 import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from node_process import die_with_parent  # noqa: E402
+from line_process import PATIENCE_S, LineProcess  # noqa: E402
 from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, to_ns  # noqa: E402
 
 NODE_ADDRESS, CLIENT_ADDRESS = "10.79.0.1", "10.79.0.2"
-PATIENCE_S = 150.0
-"""Timeout for a line of the client, s."""
 DISCOVERY_S = 60.0
 """Timeout for discovery, s: with 20 % of the datagrams lost it takes several announcements."""
 ACCEPTANCE_S = 120.0
@@ -100,58 +96,16 @@ class Link:
             # The kernel has removed it with the link.
             self._ip(self.names[0], "route", "replace", "224.0.0.0/4", "dev", self.names[0])
 
-    def client(self, domain_id: int, node: str, *words: object, env: dict[str, str] | None = None) -> Client:
-        """Returns the rclpy process on the second host."""
-        prefix = ["ip", "netns", "exec", self.names[1]]
-        return Client(prefix, [node, *map(str, words)], {"ROS_DOMAIN_ID": str(domain_id), **(env or {})})
+    def client(self, domain_id: int, node: str, *words: object, env: dict[str, str] | None = None) -> LineProcess:
+        """Starts the rclpy process on the second host."""
+        settings = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "ROS_DOMAIN_ID": str(domain_id), **(env or {})}
+        return LineProcess(__file__, node, *words, env=settings, prefix=["ip", "netns", "exec", self.names[1]])
 
     def _ip(self, name: str, *words: object) -> None:
         run("ip", "-n", name, *words)
 
     def _drop(self, name: str, *match: object) -> None:
         run("ip", "netns", "exec", name, "iptables", "-A", "INPUT", "-i", name, *match, "-j", "DROP")
-
-
-class Client:
-    """Process of the rclpy side."""
-
-    def __init__(self, prefix: Sequence[str], words: Sequence[str], env: dict[str, str]):
-        """Sets what to start."""
-        self._command = [*prefix, sys.executable, __file__, *words]
-        self._env = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", **env}
-
-    def __enter__(self) -> Client:
-        """Starts the process."""
-        self._process = subprocess.Popen(
-            self._command,
-            env=self._env,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            preexec_fn=die_with_parent,
-        )
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Kills the process."""
-        self._process.kill()
-        self._process.communicate()
-
-    def read(self) -> dict[str, Any]:
-        """Returns the result of the next step."""
-        assert self._process.stdout is not None
-        if not select.select([self._process.stdout], [], [], PATIENCE_S)[0]:
-            raise TimeoutError("no output of the client")
-        line = self._process.stdout.readline()
-        if not line:
-            raise ChildProcessError(f"the client ended with status {self._process.wait(PATIENCE_S)}")
-        return dict(json.loads(line))
-
-    def proceed(self) -> None:
-        """Lets the client begin its next step."""
-        assert self._process.stdin is not None
-        self._process.stdin.write("\n")
-        self._process.stdin.flush()
 
 
 # ----------------------------------------------------------------------------------------------------- the client
@@ -198,10 +152,9 @@ def stop(drive: AxesClient) -> None:
     longer if datagrams are lost. By the next request, it has.
     """
     for _ in range(2):
-        try:
-            return drive.stop(10.0)
-        except TimeoutError:
-            continue
+        with contextlib.suppress(TimeoutError):
+            drive.stop(10.0)
+            return
     drive.stop(10.0)
 
 
@@ -211,12 +164,11 @@ def main() -> None:
     began = time.monotonic()
     with AxesClient(node, timeout=DISCOVERY_S) as drive:
         write(discovered_s=time.monotonic() - began)
-        if command == "watch":
-            write(**watch(drive, float(value)))
-        elif command == "move":
+        if command == "move":
             move(drive, int(value))
-        elif command == "silence":
-            write(**watch(drive, float(value)))
+            return
+        write(**watch(drive, float(value)))
+        if command == "silence":
             sys.stdin.readline()
             drive.wait_until(drive.now() + NANOSECONDS, PATIENCE_S)
             write(**watch(drive, float(value)))

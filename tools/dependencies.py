@@ -3,10 +3,10 @@
 
     tools/dependencies.py               fails if the table is out of date, a license is not in deny.toml's list,
                                         a crate does not come from the registry or requires a newer Rust than
-                                        rust-version, README.md or fuzz/ state another version, or a member of
-                                        the workspace depends on what its layer excludes
+                                        rust-version, README.md or fuzz/ state another version, a member of
+                                        the workspace depends on what its layer excludes, or files import each
+                                        other in a loop
     tools/dependencies.py --write       writes the table
-    tools/dependencies.py --advisories  asks cargo-audit or cargo-deny, where one of them is installed
 
 The source is `cargo metadata` of both lock files.
 """
@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -37,12 +36,20 @@ LAYERS: dict[str, set[str]] = {
     "virtual_axes_c": FILES_AND_NETWORK | {"cdr-encoding", "quick-xml", "serde_json"},
     "virtual_axes_fmu": FILES_AND_NETWORK | {"cdr-encoding", "quick-xml", "serde_json"},
     "virtual_axes_io": FILES_AND_NETWORK - {"mcap"},
+    "virtual_axes_dds": {"mcap", "virtual_axes_core", "virtual_axes_io"},
     "virtual_axes_report": FILES_AND_NETWORK,
     "virtual_axes_py": FILES_AND_NETWORK - {"mcap"},
 }
 """Crates that a member of the workspace must not depend on, directly or through others."""
+MIDDLEWARE, MIDDLEWARE_OWNER = {"rustdds", "ros2-client"}, "virtual_axes_dds"
+"""Crates on which one member alone depends directly."""
+ROOTS = {"mod", "lib", "main"}
 REGISTRY = "registry+https://github.com/rust-lang/crates.io-index"
 PROGRAMS, SECURITY, TESTS, FUZZ = "programs", "feature security", "tests and benchmarks", "fuzz targets"
+
+
+Module = tuple[str, ...]
+Paths = dict[Module, list[str]]
 
 
 class Row(NamedTuple):
@@ -95,22 +102,9 @@ def is_allowed(expression: str, allowed: set[str]) -> bool:
         return False
 
 
-def clarified(rules: dict[str, Any], package: dict[str, Any]) -> str:
-    """Returns the license of a package from its manifest or from the clarifications in deny.toml."""
-    clarified_licenses = {rule["crate"]: rule["expression"] for rule in rules.get("clarify", [])}
-    return package["license"] or clarified_licenses.get(package["name"], "not stated")
-
-
 def version(text: str | None) -> tuple[int, ...]:
     """Returns a Rust version as numbers, major and minor; none is the oldest."""
     return tuple(int(part) for part in (text or "0.0").split(".")[:2])
-
-
-def newest_rust(rows: list[Row]) -> tuple[str, list[str]]:
-    """Returns the newest Rust version that crates require, and these crates."""
-    newest = max(version(row.rust) for row in rows)
-    names = [f"{row.name} {row.version}" for row in rows if version(row.rust) == newest]
-    return ".".join(map(str, newest)), names
 
 
 def rust_faults(rust: str, names: list[str]) -> list[str]:
@@ -146,10 +140,11 @@ def crates(rules: dict[str, Any]) -> list[Row]:
                 key = package["name"], package["version"]
                 where.setdefault(key, what)
                 packages[key] = package
+    clarified = {rule["crate"]: rule["expression"] for rule in rules.get("clarify", [])}
     rows = []
-    for key in sorted(packages):
-        package = packages[key]
-        rows.append(Row(*key, clarified(rules, package), where[key], package["source"], package["rust_version"]))
+    for key, package in sorted(packages.items()):
+        license = package["license"] or clarified.get(key[0], "not stated")
+        rows.append(Row(*key, license, where[key], package["source"], package["rust_version"]))
     return rows
 
 
@@ -162,61 +157,102 @@ def layer_faults() -> list[str]:
         if tree.returncode:
             raise SystemExit(f"dependencies: {tree.stderr.strip()}")
         needed = {line.split()[0] for line in tree.stdout.splitlines()}
-        faults += [f"{member} depends on {name}" for name in sorted(needed & excluded)]
+        faults += [f"{member} depends on {name}, which its layer excludes" for name in sorted(needed & excluded)]
+    known = metadata(ROOT / "Cargo.toml")
+    for package in known["packages"]:
+        if package["id"] in known["workspace_members"] and package["name"] != MIDDLEWARE_OWNER:
+            direct = {dependency["name"] for dependency in package["dependencies"]}
+            faults += [f"{package['name']} depends on {name} directly" for name in sorted(direct & MIDDLEWARE)]
     return faults
 
 
-def advisories() -> int:
-    """Runs cargo-audit or cargo-deny and returns its status."""
-    for program, words in (("cargo-audit", ["audit"]), ("cargo-deny", ["deny", "check"])):
-        if shutil.which(program):
-            return subprocess.run(["cargo", *words], cwd=ROOT).returncode
-    print("dependencies: needs cargo-audit or cargo-deny, and RustSec's database", file=sys.stderr)
-    return 1
+def use_paths(tree: str) -> list[str]:
+    """Returns the paths of a `use` tree, without their other names."""
+    head, brace, rest = tree.partition("{")
+    if not brace:
+        return [re.sub(r"\s+", "", tree.split(" as ")[0])]
+    parts, depth = [""], 0
+    for letter in rest[: rest.rindex("}")]:
+        depth += (letter == "{") - (letter == "}")
+        if letter == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return [head.strip() + path for part in parts if part.strip() for path in use_paths(part.strip())]
+
+
+def target(module: Module, path: str, uses: Paths, seen: frozenset[str] = frozenset()) -> Module | None:
+    """Returns the module that defines what a path in a module names, through re-exports; none outside of the crate."""
+    first, *words = path.split("::")
+    while first == "super":
+        module, first, words = module[:-1], words[0] if words else "self", words[1:]
+    module = () if first == "crate" else module
+    if first not in ("crate", "self"):
+        words = [first, *words]
+        if path.startswith(first) and (*module, first) not in uses:
+            return None
+    while words and (*module, words[0]) in uses:
+        module, words = (*module, words[0]), words[1:]
+    known = [one for one in uses[module] if words and one.endswith(f"::{words[0]}") and one not in seen]
+    return next((found for one in known if (found := target(module, one, uses, seen | {one}))), module)
+
+
+def loops(source: Path) -> list[str]:
+    """Returns the groups of files of a crate that import each other in a loop; tests are left out."""
+    imports = r"^\s*(?:pub(?:\([^)]*\))? )?use ([^;]+);"
+    uses: Paths = {}
+    paths: Paths = {}
+    files: dict[Module, Path] = {}
+    for file in sorted(source.rglob("*.rs")):
+        module = tuple(part for part in file.relative_to(source).with_suffix("").parts if part not in ROOTS)
+        if module[:1] != ("bin",):
+            code = re.sub(r"//.*|\(in [\w:]+\)", "", re.split(r"#\[cfg\(test\)\]\s*mod \w+ \{", file.read_text())[0])
+            uses[module] = [path for tree in re.findall(imports, code, re.M) for path in use_paths(tree)]
+            uses |= {(*module, name): [] for name in re.findall(r"#\[path = [^\]]*\]\s*mod (\w+);", code)}
+            inline = re.findall(r"(?<![\w:.$])([a-z_]+(?:::\w+)+)", re.sub(imports, "", code, flags=re.M))
+            paths[module], files[module] = uses[module] + inline, file
+    edges = {one: {target(one, path, uses) for path in paths[one]} & files.keys() - {one} for one in files}
+    reached = {one: set(edges[one]) for one in files}
+    for between in files:
+        for one in files:
+            if between in reached[one]:
+                reached[one] |= reached[between]
+    in_loops = (one for one in files if one in reached[one])
+    groups = {frozenset(other for other in reached[one] if one in reached[other]) for one in in_loops}
+    return [", ".join(sorted(str(files[one].relative_to(ROOT)) for one in group)) for group in groups]
 
 
 def main() -> int:
-    """Runs the checks that the command line selects."""
+    """Checks the crates, and writes or compares the table."""
     words = options.parser(__doc__)
     words.add_argument("--write", action="store_true")
-    words.add_argument("--advisories", action="store_true")
     arguments = words.parse_args()
-    if arguments.advisories:
-        return advisories()
     rules = tomllib.loads((ROOT / "deny.toml").read_text())["licenses"]
-    allowed = set(rules["allow"])
     rows = crates(rules)
-    faults = []
+    faults = [f"{row.name} {row.version}: from {row.source}" for row in rows if row.source != REGISTRY]
     for row in rows:
-        if not is_allowed(row.license, allowed):
-            faults.append(f"{row.name} {row.version}: license {row.license}")
-        if row.source != REGISTRY:
-            faults.append(f"{row.name} {row.version}: from {row.source}")
-    layers = layer_faults()
-    for fault in layers:
-        print(f"dependencies: {fault}, which LAYERS of tools/dependencies.py excludes", file=sys.stderr)
-    for fault in faults:
-        print(f"dependencies: {fault}, which deny.toml does not allow", file=sys.stderr)
-    rust, names = newest_rust(rows)
-    of_rust = rust_faults(rust, names)
-    for fault in of_rust:
-        print(f"dependencies: {fault}", file=sys.stderr)
+        if not is_allowed(row.license, set(rules["allow"])):
+            faults.append(f"{row.name} {row.version}: deny.toml does not allow the license {row.license}")
+    newest = max(version(row.rust) for row in rows)
+    rust = ".".join(map(str, newest))
+    names = [f"{row.name} {row.version}" for row in rows if version(row.rust) == newest]
+    faults += layer_faults() + rust_faults(rust, names)
+    programs = (folder for folder in ROOT.glob("src/bin/*") if folder.is_dir())
+    for source in (*ROOT.glob("crates/*/src"), ROOT / "src", *programs):
+        faults += [f"files import each other in a loop: {group}" for group in loops(source)]
     head = f"Newest Rust required by a crate: {rust} ({', '.join(names)}).\n\n"
     head += "| crate | version | license | needed by |\n|---|---|---|---|\n"
     table = head + "".join(f"| {row.name} | {row.version} | {row.license} | {row.what} |\n" for row in rows)
-    text = TABLE.read_text()
-    before, rest = text.split(BEGIN)
+    before, rest = TABLE.read_text().split(BEGIN)
     present, after = rest.split(END)
     if arguments.write:
         TABLE.write_text(before + BEGIN + table + END + after)
     elif present != table:
-        faults.append("table")
-        print(
-            "dependencies: docs/internals/dependencies.md is out of date: tools/dependencies.py --write",
-            file=sys.stderr,
-        )
+        faults.append("docs/internals/dependencies.md is out of date: tools/dependencies.py --write")
+    for fault in faults:
+        print(f"dependencies: {fault}", file=sys.stderr)
     print(f"{len(rows)} crates, {sum(row.what == PROGRAMS for row in rows)} of them in the programs")
-    return bool(faults or layers or of_rust)
+    return bool(faults)
 
 
 if __name__ == "__main__":

@@ -30,11 +30,23 @@ build() {
   RUSTFLAGS="$coverage --cfg fuzzing" cargo build --manifest-path fuzz/Cargo.toml --release --locked --target "$host" --bins
 }
 
+# Writes libFuzzer's dictionary: names of parameters, which the reference lists from the schema, keys of the built-in
+# files, words of the seeds, and numbers and marks of YAML that none of them has.
+dictionary() {
+  mkdir -p .build
+  {
+    grep -rhoE '`[a-z0-9_.]{2,40}`' docs/reference/parameters | tr -d '`'
+    grep -rhoE '[a-z0-9_]{1,40}: ' config
+    LC_ALL=C grep -rhIoE '[<"#$~/_:-]{0,3}[A-Za-z_][A-Za-z0-9_]{1,30}[]:=.>([{]{0,2}' fuzz/seeds
+    printf '%s\n' -0.0 1e-320 1e308 .inf .nan '!!float' '&a' '*a' --- '<<: ' '**' '{node}'
+  } | LC_ALL=C sort -u | sed 's/[\\"]/\\&/g; s/.*/"&"/' >.build/words.dict
+}
+
 fuzz_one() { # target, log, options of libFuzzer
   local target=$1 log=$2
   shift 2
   mkdir -p "fuzz/corpus/$target" "fuzz/artifacts/$target"
-  "$binaries/$target" "${limits[@]}" -dict=fuzz/words.dict -artifact_prefix="fuzz/artifacts/$target/" "$@" >"$log" 2>&1
+  "$binaries/$target" "${limits[@]}" -dict=.build/words.dict -artifact_prefix="fuzz/artifacts/$target/" "$@" >"$log" 2>&1
 }
 
 # Prints the end of the log of a failed run.
@@ -84,6 +96,7 @@ case $mode in
     ;;
   short)
     build
+    dictionary
     export -f fuzz_one short_one show_failure
     export binaries seed runs
     export LIMITS="${limits[*]}"
@@ -92,6 +105,7 @@ case $mode in
   long)
     minutes=${2:?MINUTES in total for all targets}
     build
+    dictionary
     mkdir -p .build/fuzz
     rm -f .build/fuzz/*.row
     count=$(wc -w <<<"$targets")

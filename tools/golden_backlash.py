@@ -18,17 +18,17 @@ environment, theta, number of events so far.
 """
 
 import math
-from pathlib import Path
 
 import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
+from golden import write
+
 TICK = 125e-6
 TICKS = 1600
 ROW_TICKS = 20
 PARTS = 100
-GOLDEN = Path(__file__).resolve().parents[1] / "crates/core/tests/golden"
 MOTOR = (8e-3, 0.5, 1.35, 1.35, 0.016)
 # Stiffness, damping, load inertia, gap, structure (inertia, frequency, ratio), direct, voltage, torque, mean torque.
 CASES = [
@@ -127,20 +127,15 @@ def solve(case):
 
 def main():
     """Writes the tables."""
-    columns = (
-        "inductance,resistance,torque_constant,emf_constant,inertia,stiffness,damping,load,gap,modal,frequency,ratio"
-    )
-    cases = [columns + ",direct,voltage,torque,mean_torque"]
-    rows = ["case,tick,current,speed,wind_up,load_speed,angle,events"]
+    rows = []
     for number, case in enumerate(CASES):
-        cases.append(",".join(repr(float(value)) for value in case))
-        for tick, *values in solve(case):
-            rows.append(
-                f"{number},{tick}," + ",".join(f"{float(value):.15e}" for value in values[:-1]) + f",{values[-1]}"
-            )
+        for tick, *values, events in solve(case):
+            rows.append([str(number), str(tick), *(f"{float(value):.15e}" for value in values), str(events)])
         print(rows[-1])
-    (GOLDEN / "backlash_cases.csv").write_text("\n".join(cases) + "\n")
-    (GOLDEN / "backlash.csv").write_text("\n".join(rows) + "\n")
+    columns = "inductance,resistance,torque_constant,emf_constant,inertia,stiffness,damping,load,gap,modal,"
+    columns += "frequency,ratio,direct,voltage,torque,mean_torque"
+    write("backlash_cases", columns.split(","), ([repr(float(value)) for value in case] for case in CASES))
+    write("backlash", "case,tick,current,speed,wind_up,load_speed,angle,events".split(","), rows)
 
 
 if __name__ == "__main__":

@@ -1,25 +1,26 @@
 #!/usr/bin/env python3
-"""Writes drives.csv and loops.csv of crates/core/tests/golden: drives at the limits of their ranges, with 120 digits.
+"""Writes drives.csv, loops.csv and transmissions.csv of crates/core/tests/golden, with 120 digits.
 
     pip install mpmath==1.4.1
     python tools/golden_drives.py
 
 Nothing here is taken from the library: the differential equations and the laws of the controllers are those that are
-printed in Prévost et al., written as matrices. Inputs are f64 numbers; outputs are exact to the last digit of one.
+printed in Prévost et al., and those of two masses with a spring and a damper, written as matrices. Inputs are f64
+numbers; outputs are exact to the last digit of one. Drives are at the limits of their ranges.
 """
 
 import itertools
-import pathlib
+import math
 import random
 
 import mpmath
 from mpmath import mpf
 
 import options
+from golden import write
 
 # Digits: the largest exponent has 14, the smallest significant entries need 60.
 mpmath.mp.dps = 120
-GOLDEN = pathlib.Path(__file__).parent.parent / "crates/core/tests/golden"
 SEED = 8
 
 # SI, minimum and maximum of the schema, deviations of the plant included; one value between them.
@@ -125,16 +126,18 @@ def number(value):
 
 
 def drives():
-    lines = [",".join([*RANGES, "rejected", *(f"{row}_{column}" for row in "iwt" for column in "iwuq")])]
+    """Writes steps of drives."""
+    rows = []
     for motor in motors():
         fields = [number(motor[name]) for name in RANGES]
         if turns_back(motor, motor["tick"]):
-            lines.append(",".join([*fields, "1"] + ["0"] * 12))
+            rows.append([*fields, "1"] + ["0"] * 12)
             continue
         e = step(motor, motor["tick"])
         entries = [e[row, column] for row in range(3) for column in (0, 1, 3, 4)]
-        lines.append(",".join([*fields, "0", *map(number, entries)]))
-    return lines
+        rows.append([*fields, "0", *map(number, entries)])
+    columns = [*RANGES, "rejected", *(f"{row}_{column}" for row in "iwt" for column in "iwuq")]
+    write("drives", columns, rows)
 
 
 # X axis of the default machine, in the units of machine files: value, and the factor to SI.
@@ -208,6 +211,7 @@ def impulse(values, tick_ns, ticks, instants):
 
 
 def loops():
+    """Writes impulse responses of the cascade."""
     mpmath.mp.dps = 80
     source = random.Random(SEED)
     names = list(LOOPS)
@@ -220,22 +224,64 @@ def loops():
     for _ in range(80):
         factors = [10 ** source.uniform(-2, 2) for _ in names]
         cases.append(([v * f for v, f in zip(middle, factors)], source.choice(PERIODS)))
-    lines = [",".join([*names, "tick_ns", "ticks", "instants", *(f"theta_{k + 1}" for k in range(IMPULSE))])]
+    rows = []
     for values, periods in cases:
-        fields = [*map(repr, values), *map(str, periods)]
-        lines.append(
-            ",".join(
-                [*fields, *(number(min(abs(v), mpf("1e300")) * mpmath.sign(v)) for v in impulse(values, *periods))]
-            )
-        )
-    return lines
+        angles = (number(min(abs(v), mpf("1e300")) * mpmath.sign(v)) for v in impulse(values, *periods))
+        rows.append([*map(repr, values), *map(str, periods), *angles])
+    columns = [*names, "tick_ns", "ticks", "instants", *(f"theta_{k + 1}" for k in range(IMPULSE))]
+    write("loops", columns, rows)
+
+
+# Motor: total inertia, Kt, Ke, R, L, tick; those of the default X axis and of drives far from it.
+MOTORS = (
+    (0.028, 2.64, 0.88, 0.46, 8.5e-3, 125e-6),
+    (0.0021, 1.1, 0.64, 1.9, 4.1e-3, 125e-6),
+    (0.4, 12.0, 6.9, 1.2, 2.0e-2, 250e-6),
+    (850.0, 210.0, 70.0, 2.1, 1.5e-2, 100e-6),
+    (0.0004, 0.4, 0.2, 0.02, 4.0e-4, 31.25e-6),
+)
+STATES = ("current", "speed", "wind_up", "load_speed", "angle")
+
+
+def elastic_step(motor, transmission):
+    """Returns rows of i, ω, δ, ω_load and θ by i, ω, δ, ω_load, u, the torque at the motor and that at the load."""
+    inertia, torque, emf, resistance, inductance, tick = map(mpf, motor)
+    stiffness, damping, load = map(mpf, transmission)
+    own = inertia - load
+    a = mpmath.zeros(8, 8)
+    a[0, 0], a[0, 1], a[0, 5] = -resistance / inductance, -emf / inductance, 1 / inductance
+    a[1, 0], a[1, 1], a[1, 2], a[1, 3], a[1, 6] = torque / own, -damping / own, -stiffness / own, damping / own, 1 / own
+    a[2, 1], a[2, 3] = 1, -1
+    a[3, 1], a[3, 2], a[3, 3], a[3, 7] = damping / load, stiffness / load, -damping / load, 1 / load
+    a[4, 1] = 1
+    e = exponential(a * tick)
+    return [e[row, column] for row in range(5) for column in (0, 1, 2, 3, 5, 6, 7)]
+
+
+def transmissions():
+    """Draws transmissions with resonances up to the Nyquist frequency of the ticks."""
+    source = random.Random(31)
+    columns = ["inertia", "torque_constant", "emf_constant", "resistance", "inductance", "tick"]
+    columns += ["stiffness", "damping", "load_inertia"]
+    columns += [f"{row}_by_{column}" for row in STATES for column in (*STATES[:4], "u", "motor", "load")]
+    rows = []
+    for index in range(60):
+        motor = MOTORS[index % len(MOTORS)]
+        load = motor[0] * source.uniform(0.05, 0.95)
+        reduced = load * (motor[0] - load) / motor[0]
+        resonance = math.tau * 10 ** source.uniform(0.5, math.log10(0.45 / motor[5]))
+        stiffness = reduced * resonance**2
+        ratio = source.choice((0.0, 10 ** source.uniform(-4, 0.3)))
+        transmission = (stiffness, 2 * ratio * math.sqrt(stiffness * reduced), load)
+        rows.append(map(repr, [*motor, *transmission, *map(float, elastic_step(motor, transmission))]))
+    write("transmissions", columns, rows)
 
 
 def main():
     options.parser(__doc__).parse_args()
-    GOLDEN.mkdir(exist_ok=True)
-    (GOLDEN / "drives.csv").write_text("\n".join(drives()) + "\n")
-    (GOLDEN / "loops.csv").write_text("\n".join(loops()) + "\n")
+    drives()
+    transmissions()
+    loops()
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ security_tests() {
 simultaneous_starts() {
   # shellcheck source=/dev/null
   source .build/env.sh
-  tools/measure_simultaneous_start.py --trials 200
+  tools/measure.py simultaneous-start --trials 200
 }
 
 check "build with DDS Security" cargo build --locked --features security --bin virtual_axes_node --target-dir .build/security

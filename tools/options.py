@@ -43,13 +43,11 @@ def domain_id(text: str) -> int:
 
 
 def _whole(text: str, least: int, most: int | None = None) -> int:
-    wrong = f"{text!r} is not a whole number from {least} {'on' if most is None else f'to {most}'}"
     # int() is slow for very long numbers.
-    if not (text.isascii() and text.isdecimal()) or len(text) > DIGITS:
-        raise argparse.ArgumentTypeError(wrong)
-    value = int(text)
+    value = int(text) if text.isascii() and text.isdecimal() and len(text) <= DIGITS else -1
     if value < least or (most is not None and value > most):
-        raise argparse.ArgumentTypeError(wrong)
+        limit = "on" if most is None else f"to {most}"
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from {least} {limit}")
     return value
 
 

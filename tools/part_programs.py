@@ -4,38 +4,26 @@
     tools/part_programs.py                                   fails if a generated file in config/programs differs
     tools/part_programs.py --write                           writes these files
     tools/part_programs.py --raster 150000 > raster.nc       raster of at least that many motions
-    tools/part_programs.py --s-path 0.1 > s.nc               S with points every 0.1 mm
-    tools/part_programs.py --measure                         time and memory of `virtual_axes` on rasters: Markdown
 
 The raster follows the surface z = 0.8 mm sin(2 pi x / 20 mm) cos(2 pi y / 26 mm) in passes of 24 mm, 0.3 mm apart. As
 in CAM, lines are as long as the chord error of 0.01 um allows, 50 um at most, and coordinates have 4 decimals.
 
 The S has two arcs of 270 degrees with a radius of 30 mm. The tool leans to the left of the path, by 15 degrees with a
 wave of 10 degrees. The program controls the tool center point (G43.4), for machines with the tables A and C.
-
-The measurement executes `virtual_axes run`, `check` and `psec` of `cargo build --release` on rasters of 37 500, 75 000
-and 150 000 motions: elapsed time, and processor time, which other load changes less. Segments per minute and relative
-time are of the processor time; the latter is that per segment, divided by that of the shortest raster.
 """
 
 from __future__ import annotations
 
-import argparse
-import os
-import subprocess
 import sys
-import tempfile
-import time
 from collections.abc import Iterator
 from math import cos, degrees, pi, sin, sqrt
 from pathlib import Path
 
 import options
 
-CHECKOUT = Path(__file__).resolve().parent.parent
-FOLDER = CHECKOUT / "config" / "programs"
-COMMITTED_SEGMENTS = 12_000
-COMMITTED_SPACING = 0.5
+FOLDER = Path(__file__).resolve().parent.parent / "config" / "programs"
+SEGMENTS = 12_000
+SPACING = 0.5
 
 HEIGHT, WAVE_X, WAVE_Y = 0.8, 2 * pi / 20, 2 * pi / 26
 PASS, STEP_OVER = 24.0, 0.3
@@ -45,20 +33,6 @@ RASTER_FEED = 3000
 RADIUS, ARC = 30.0, 3 * pi / 2
 TILT, TILT_WAVE = 15.0, 10.0
 S_FEED = 2000
-
-MEASURED_SEGMENTS = (37_500, 75_000, 150_000)
-TIMEOUT = 1800
-
-
-def arguments() -> argparse.Namespace:
-    """Reads the command line."""
-    parser = options.parser(__doc__)
-    parser.add_argument("--write", action="store_true", help="writes the files in config/programs")
-    choice = parser.add_mutually_exclusive_group()
-    choice.add_argument("--raster", type=options.whole, metavar="MOTIONS", help="prints a raster")
-    choice.add_argument("--s-path", type=options.positive, metavar="MM", help="prints an S with this spacing")
-    choice.add_argument("--measure", action="store_true", help="prints time and memory on rasters")
-    return parser.parse_args()
 
 
 def raster_points(segments: int) -> Iterator[tuple[float, float]]:
@@ -122,14 +96,11 @@ def s_path(spacing: float) -> Iterator[str]:
     count = max(round(total / spacing), 1)
     yield from ("%", "(S-shaped five-axis path with tool center point control: tools/part_programs.py)")
     yield from ("G21 G17 G90 G94 G40 G49 G80 G54", "T1 M6", "S10000 M3", "G64 P0.01")
-    first = True
-    for index in range(count + 1):
+    x, y, a, c = s_point(0.0)
+    yield from (f"G0 A{a:.4f} C{c:.4f}", "G43.4 H1", f"G0 X{x:.4f} Y{y:.4f} Z20", f"G1 Z0 F{S_FEED}")
+    for index in range(1, count + 1):
         x, y, a, c = s_point(total * index / count)
-        if first:
-            yield from (f"G0 A{a:.4f} C{c:.4f}", "G43.4 H1", f"G0 X{x:.4f} Y{y:.4f} Z20", f"G1 Z0 F{S_FEED}")
-            first = False
-        else:
-            yield f"X{x + 0.0:.4f} Y{y + 0.0:.4f} A{a:.4f} C{c:.4f}"
+        yield f"X{x + 0.0:.4f} Y{y + 0.0:.4f} A{a:.4f} C{c:.4f}"
     yield from ("G0 Z20", "G49", "M5", "G53 G0 Z0", "G0 A0 C0", "M30", "%")
 
 
@@ -138,68 +109,27 @@ def text(lines: Iterator[str]) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def measured(command: list[str]) -> tuple[float, float, float]:
-    """Runs a command without output; returns elapsed and processor time in s and the largest resident memory in MiB."""
-    began = time.monotonic()
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
-        while True:
-            identifier, status, usage = os.wait4(process.pid, os.WNOHANG)
-            seconds = time.monotonic() - began
-            if identifier:
-                break
-            if seconds > TIMEOUT:
-                process.kill()
-            time.sleep(0.02)
-        process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode != 0:
-        raise subprocess.CalledProcessError(process.returncode, command)
-    return seconds, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
-
-
-def measure() -> None:
-    """Prints a table of times and memory of the commands on rasters."""
-    binary = CHECKOUT / "target" / "release" / "virtual_axes"
-    print("| command | segments | elapsed (s) | processor (s) | segments per minute | relative time | memory (MiB) |")
-    print("|---|---|---|---|---|---|---|")
-    with tempfile.TemporaryDirectory() as folder:
-        programs = []
-        for segments in MEASURED_SEGMENTS:
-            program = Path(folder) / f"raster-{segments}.nc"
-            program.write_text(text(raster(segments)))
-            programs.append((program, sum(1 for _ in raster_points(segments))))
-        for name in ("run", "check", "psec"):
-            out = ["--out", f"{folder}/setpoints.csv"] if name == "psec" else []
-            first = None
-            for program, segments in programs:
-                elapsed, used, memory = measured([str(binary), name, str(program), *out])
-                first = first or used / segments
-                print(
-                    f"| `{name}` | {segments} | {elapsed:.1f} | {used:.1f} | {segments / used * 60e-6:.1f} million "
-                    f"| {used / segments / first:.2f} | {memory:.0f} |",
-                    flush=True,
-                )
-
-
 def main() -> int:
-    """Prints a program or measurements, or writes or compares the files."""
-    args = arguments()
-    if args.measure:
-        measure()
+    """Prints a program, or writes or compares the files."""
+    parser = options.parser(__doc__)
+    parser.add_argument("--write", action="store_true", help="writes the files in config/programs")
+    parser.add_argument("--raster", type=options.whole, metavar="MOTIONS", help="prints a raster")
+    args = parser.parse_args()
+    if args.raster:
+        print(text(raster(args.raster)), end="")
         return 0
-    if args.raster or args.s_path:
-        for line in raster(args.raster) if args.raster else s_path(args.s_path):
-            print(line)
-        return 0
-    files = {
-        "finishing-raster.nc": text(raster(COMMITTED_SEGMENTS)),
-        "s-path-five-axis.nc": text(s_path(COMMITTED_SPACING)),
-    }
-    differing = [name for name, content in files.items() if not args.write and (FOLDER / name).read_text() != content]
-    for name, content in files.items() if args.write else ():
-        (FOLDER / name).write_text(content)
-    for name in differing:
-        print(f"part_programs: config/programs/{name} differs from the generator", file=sys.stderr)
-    return 1 if differing else 0
+    status = 0
+    for name, lines in (
+        ("finishing-raster", raster(SEGMENTS)),
+        ("s-path-five-axis", s_path(SPACING)),
+    ):
+        file, content = FOLDER / f"{name}.nc", text(lines)
+        if args.write:
+            file.write_text(content)
+        elif file.read_text() != content:
+            print(f"part_programs: {file} differs from the generator", file=sys.stderr)
+            status = 1
+    return status
 
 
 if __name__ == "__main__":

@@ -1,4 +1,12 @@
-"""Small pictures for the documentation: runs of `virtual_axes`, and SVG files with simplified curves."""
+#!/usr/bin/env python3
+"""Draws the pictures of the documentation by runs of `virtual_axes`: small SVG files with simplified curves.
+
+    cargo build --release && source .build/env.sh
+    tools/pictures.py                     writes ballbar.svg (README.md) and figure-11.svg (the paper's) in docs/images
+
+./demo.sh draws the ballbars over ROS 2. Figure 11: a tuning that is better on the circle and worse at a corner, found
+by `virtual_axes tune ballbar --controller gpc --also corner-45 --contrast`.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +14,9 @@ import json
 import os
 import re
 import subprocess
+import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib
@@ -16,7 +26,12 @@ import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen before)
 import numpy as np  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 
+import options  # noqa: E402
+
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "test_py"))
+from polar_chart import Circle, draw  # noqa: E402
+
 PROGRAM = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / "virtual_axes"
 IMAGES = ROOT / "docs" / "images"
 TOLERANCE = 0.1
@@ -35,6 +50,10 @@ STYLE = {
 RADIUS_MM = 150.0
 STEADY = (1.5, 8.04)
 """Span between the ramps of the ballbar, as in the definition of the radial deviation, s."""
+TUNING = {"n1": 1, "n2": 9, "nu": 8, "lambda_rel": 0.5}
+SYMBOLS = {"n1": "N1", "n2": "N2", "nu": "Nu", "lambda_rel": "λ_rel"}
+LEG_MM, AROUND_MM = 50.0, 2.5
+"""End of the first leg of the corner, and the displayed range around the corner, mm."""
 
 
 def run(scenario: str, *options: str) -> tuple[dict, dict[str, np.ndarray]]:
@@ -60,8 +79,64 @@ def ballbar(*options: str) -> tuple[dict, dict[str, np.ndarray]]:
     return figures, {"time": trace["time"][steady], "angle": angle, "deviation": (np.hypot(x, y) - RADIUS_MM) * 1e3}
 
 
-def save(figure: Figure, path: Path, title: str, tolerance: float = TOLERANCE) -> None:
-    """Writes an SVG file with a white background, with curves simplified to the tolerance."""
+def ballbars() -> Figure:
+    """Draws a ballbar with each position controller."""
+    circles = {}
+    for title, controller in (
+        ("cascade with feedforward", "cascade"),
+        ("cascade without feedforward", "cascade-noff"),
+        ("predictive control", "gpc"),
+    ):
+        figures, trace = ballbar("--controller", controller)
+        [circle] = figures["circles"]
+        mean = circle["radial_deviation_um"]["mean"]
+        circles[title] = Circle(trace["angle"], trace["deviation"], mean, circle["circular_deviation_um"])
+    return draw(circles)
+
+
+def figure_11(tuning: dict[str, float] = TUNING) -> Figure:
+    """Draws circle and corner with both controllers, and prints the contour errors."""
+    loops = [f"{axis}.position_loop" for axis in "xy"]
+    changes = [f"--set={loop}.controller=gpc" for loop in loops]
+    changes += [f"--set={loop}.gpc.{name}={value}" for loop in loops for name, value in tuning.items()]
+    gpc = "GPC " + ", ".join(f"{symbol} {tuning[name]:g}" for name, symbol in SYMBOLS.items())
+    figure, (circle, corner) = plt.subplots(1, 2, figsize=(11, 5))
+    runs = ("cascade", "cascade with feedforward", "#2a7ab9", []), ("gpc", gpc, "#d95f02", changes)
+    for part, name, color, changed in runs:
+        of_circle, trace = ballbar("--trace-period", "1ms", *changed)
+        circle.plot(trace["time"], trace["deviation"], color=color, label=name, gid=f"circle-{part}")
+        of_corner, trace = run("corner-45", "--trace-period", "1ms", *changed)
+        near = abs(trace["x"] - LEG_MM) < 2 * AROUND_MM
+        corner.plot(trace["x"][near], trace["y"][near], color=color, label=name, gid=f"corner-{part}")
+        for error in (of_circle["contour_error_um"], of_corner["contour_error_um"]):
+            print(f"{name}: {error['max']:.1f} µm, within the ends {error['max_within_ends']:.1f} µm")
+    corner.plot([0, LEG_MM, LEG_MM + LEG_MM], [0, 0, LEG_MM], "k--", linewidth=0.8, label="path")
+    circle.set(xlabel="time (s)", ylabel="radial deviation (µm)", title="ballbar: R 150 mm at 15 m/min")
+    corner.set(xlabel="X (mm)", ylabel="Y (mm)", title="corner-45: 10 m/min", aspect="equal")
+    corner.set(xlim=(LEG_MM - AROUND_MM, LEG_MM + AROUND_MM), ylim=(-AROUND_MM / 5, AROUND_MM / 2))
+    circle.grid(alpha=0.3)
+    corner.grid(alpha=0.3)
+    figure.tight_layout(rect=(0, 0.08, 1, 1))
+    figure.legend(*corner.get_legend_handles_labels(), loc="lower center", ncols=3)
+    return figure
+
+
+PICTURES: dict[str, tuple[Callable[[], Figure], str]] = {
+    "ballbar.svg": (ballbars, "Ballbar: radial deviation over the polar angle"),
+    "figure-11.svg": (figure_11, "Radial deviation on a circle and position at a corner, of two controllers"),
+}
+"""Function and title of each file in docs/images."""
+
+
+def write(name: str, path: Path, tolerance: float = TOLERANCE, **changes: object) -> None:
+    """Draws a picture and writes it as SVG with a white background, with curves simplified to the tolerance."""
+    function, title = PICTURES[name]
+    with plt.rc_context(STYLE):
+        save(function(**changes), path, title, tolerance)
+
+
+def save(figure: Figure, path: Path, title: str, tolerance: float) -> None:
+    """Writes a figure."""
     figure.canvas.draw()
     # Its positions are final.
     figure.set_layout_engine("none")
@@ -122,14 +197,19 @@ def _points(data: str) -> np.ndarray:
     return np.array(re.findall(r"-?[\d.]+", data), dtype=float).reshape(-1, 2)
 
 
-def extremes(values: np.ndarray, count: int) -> np.ndarray:
-    """Returns indices of the first and last value, and of minimum and maximum of each group of `count` values."""
-    groups = (slice(first, first + count) for first in range(0, len(values), count))
-    found = {group.start + int(end(values[group])) for group in groups for end in (np.argmin, np.argmax)}
-    return np.array(sorted(found | {0, len(values) - 1}))
-
-
 def curves(svg: str) -> dict[str, np.ndarray]:
     """Returns the points of each curve with an identifier (`gid` of its line)."""
     found = re.findall(r'<g id="([^"]+)">\s*<path d="m([^"]*)"', svg)
     return {name: np.cumsum(_points(data), axis=0) for name, data in found}
+
+
+def main() -> None:
+    """Writes both files."""
+    options.parser(__doc__).parse_args()
+    for name in PICTURES:
+        write(name, IMAGES / name)
+        print(f"{IMAGES.relative_to(ROOT)}/{name}")
+
+
+if __name__ == "__main__":
+    main()

@@ -13,6 +13,8 @@ import os
 import subprocess
 import sys
 import textwrap
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import options
@@ -58,55 +60,59 @@ def number(value: float, digits: int = 1) -> str:
     return (text if float(text) else text.removeprefix("-")).replace("-", "−")
 
 
-def section(title: str, text: str, command: str, rows: list[tuple[str, str, str, str]]) -> str:
-    """Returns the section of one figure of the paper."""
-    lines = [
-        f"\n## {title}\n",
-        textwrap.fill(text, WIDTH, break_on_hyphens=False),
-        f"\n    virtual_axes run {command}\n",
-    ]
-    lines += ["| what | paper | specified | here |", "|---|---|---|---|"]
-    lines += ["| " + " | ".join(row) + " |" for row in rows]
-    return "\n".join(lines) + "\n"
+def row(what: str, value: float, digits: int = 1, paper: str = "—", specified: str = "—") -> str:
+    """Returns a row of a table."""
+    return f"| {what} | {paper} | {specified} | {number(value, digits)} |"
 
 
-def axis_rows(run: dict, axis: str, specified: tuple[str, str], paper: str = "—") -> list[tuple[str, str, str, str]]:
-    """Returns the largest delay-compensated following error and current of an axis."""
+def error_row(run: dict, axis: str, **cells: str) -> str:
+    """Returns the row of the largest delay-compensated following error of an axis."""
     figures = run["axes"][axis]
     unit = {"um": "µm", "mdeg": "mdeg"}[figures["unit"]]
-    name = axis.upper()
-    error, current = figures["delay_compensated_following_error"]["max"], figures["peak_current_a"]
+    what = f"{axis.upper()}, largest delay-compensated following error, {unit}"
+    return row(what, figures["delay_compensated_following_error"]["max"], **cells)
+
+
+def axis_rows(run: dict, axis: str, error: str = "—", current: str = "—", paper: str = "—") -> list[str]:
+    """Returns the largest error and current of an axis, with their specified values."""
+    peak = run["axes"][axis]["peak_current_a"]
     return [
-        (f"{name}, largest delay-compensated following error, {unit}", paper, specified[0], number(error)),
-        (f"{name}, largest current, A", "—", specified[1], number(current, 2)),
+        error_row(run, axis, paper=paper, specified=error),
+        row(f"{axis.upper()}, largest current, A", peak, 2, specified=current),
     ]
 
 
-def contour_rows(run: dict) -> list[tuple[str, str, str, str]]:
+def contour_rows(run: dict) -> list[str]:
     """Returns contour and orientation errors."""
     contour, orientation = run["contour_error_um"], run["orientation_error_mdeg"]
     rows = [
-        ("contour error, max, µm", "—", "—", number(contour["max"])),
-        ("the same without end overshoot, µm", "—", "—", number(contour["max_within_ends"])),
-        ("contour error, RMS, µm", "—", "—", number(contour["rms"])),
+        row("contour error, max, µm", contour["max"]),
+        row("the same without end overshoot, µm", contour["max_within_ends"]),
+        row("contour error, RMS, µm", contour["rms"]),
     ]
-    if orientation["max"] > 0:
-        rows.append(("orientation error, max, mdeg", "—", "—", number(orientation["max"])))
-    return rows
+    return rows + ([row("orientation error, max, mdeg", orientation["max"])] if orientation["max"] > 0 else [])
 
 
-def following_error_rows(run: dict) -> list[tuple[str, str, str, str]]:
-    """Returns the largest delay-compensated following error of each moving axis."""
-    units = {"um": "µm", "mdeg": "mdeg"}
+def path_rows(run: dict) -> list[str]:
+    """Returns the errors of the moving axes and of the path."""
+    return [error_row(run, name) for name, axis in run["axes"].items() if axis["moves"]] + contour_rows(run)
+
+
+def corner_row(run: dict, specified: str, title: str = "") -> str:
+    """Returns the largest contour error at the corner."""
+    what = f"{title}largest contour error at the corner, µm"
+    return row(what, run["corners"][0]["max_contour_error_um"], specified=specified)
+
+
+def circle_rows(run: dict, title: str, paper: str, *specified: str) -> list[str]:
+    """Returns the radial deviation of the first circle; `specified` are mean, minimum and maximum."""
+    deviation = run["circles"][0]["radial_deviation_um"]
+    names = {"mean": f"{title}: radial deviation, mean, µm", "min": f"{title}: smallest, µm"}
+    names["max"] = f"{title}: largest, µm"
+    papers = (paper, "—", "—")
     return [
-        (
-            f"{name.upper()}, largest delay-compensated following error, {units[axis['unit']]}",
-            "—",
-            "—",
-            number(axis["delay_compensated_following_error"]["max"]),
-        )
-        for name, axis in run["axes"].items()
-        if axis["moves"]
+        row(what, deviation[key], paper=printed, specified=value)
+        for (key, what), printed, value in zip(names.items(), papers, specified, strict=True)
     ]
 
 
@@ -123,158 +129,130 @@ def predictive(scenario: str) -> str:
     return CONTINUED.join([f"{scenario} --controller gpc", *lines, f"--compare {','.join(second)}"])
 
 
-def circle_rows(
-    run: dict, paper: str, specified: tuple[str, str, str], title: str | None = None
-) -> list[tuple[str, str, str, str]]:
-    """Returns the radial deviation of the first circle."""
-    deviation = run["circles"][0]["radial_deviation_um"]
-    title = title or run["controller"]
-    return [
-        (f"{title}: radial deviation, mean, µm", paper, specified[0], number(deviation["mean"])),
-        (f"{title}: smallest, µm", "—", specified[1], number(deviation["min"])),
-        (f"{title}: largest, µm", "—", specified[2], number(deviation["max"])),
-    ]
+AGREES = "measured and simulated agree to "
+SECTIONS: list[tuple[str, str, str, Callable[..., list[str]]]] = [
+    (
+        "Figure 6: one axis at constant velocity",
+        "X over 200 mm at 10 m/min; the paper prints neither length nor feed.",
+        "x-constant",
+        lambda run: axis_rows(run, "x", "218.9", "14.40", AGREES + "4 µm, during acceleration to 6 µm"),
+    ),
+    *(
+        (
+            f"Section 4.1: {axis.upper()}",
+            f"The same trial on {axis.upper()}{turn}; the paper has no figure of it.",
+            f"{axis}-constant",
+            partial(lambda run, axis, specified: axis_rows(run, axis, *specified), axis=axis, specified=specified),
+        )
+        for axis, turn, *specified in (
+            ("y", "", "230.5", "12.40"),
+            ("z", "", "102.7", "11.50"),
+            ("a", ", 90° at 10 rpm", "35.0", "2.37"),
+            ("c", ", 90° at 10 rpm", "35.4", "1.76"),
+        )
+    ),
+    (
+        "Figure 7: two velocities on C",
+        "0 to 130° at 18 rpm, then to 210° at 6 rpm, reached at 130°.",
+        "c-two-speeds",
+        lambda run: axis_rows(run, "c", paper=AGREES + "0.006°"),
+    ),
+    (
+        "Section 4.1, case 3: reciprocating motion",
+        "X over 200 mm and back at 10 m/min.",
+        "x-there-and-back",
+        lambda run: axis_rows(run, "x"),
+    ),
+    *(
+        (
+            f"Figure 8 {letter}: {name}",
+            f"{text}. In the paper {AGREES}5 µm or 0.005°, on the spline to 12 µm.",
+            name,
+            path_rows,
+        )
+        for letter, name, text in (
+            ("a", "contour-a", "A closed polygon, stopping at the corners"),
+            ("b", "contour-b", "Two lines joined by half circles"),
+            ("c", "orientation-ac", "A and C turn together; the shape is assumed"),
+            ("d", "bspline-3d", "A cubic B-spline in X, Y and Z; its control points are assumed"),
+        )
+    ),
+    (
+        "Figure 10, left: the ballbar",
+        "A circle of 150 mm radius at 15 m/min, two turns at full feed. The paper's unit is misprinted as mm.",
+        "ballbar --controller cascade,cascade-noff",
+        lambda cascade, without: [
+            *circle_rows(cascade, cascade["controller"], "50 (left)", "49.0 ± 0.2", "47.7 ± 1", "68.6 ± 1"),
+            *circle_rows(without, without["controller"], "—", "−283.1 ± 0.2", "−284.4 ± 1", "−263.5 ± 1"),
+        ],
+    ),
+    (
+        "Figure 10, right: the ballbar under predictive control",
+        "The rows contain N1, N2, Nu and λ_rel; the paper does not print its tuning. The extremes are reversal "
+        "spikes at the friction reversals in the quadrants.",
+        predictive("ballbar"),
+        lambda stiff, soft: [
+            *circle_rows(stiff, TUNINGS[0], "almost 0 (right)", "0.0 ± 0.2", "−9.5 ± 1", "10.4 ± 1"),
+            *circle_rows(soft, TUNINGS[1], "almost 0 (right)", "−1.6 ± 0.2", "−10.4 ± 1", "10.9 ± 1"),
+        ],
+    ),
+    (
+        "Figure 10, right: tuning of the machine file, and friction compensation",
+        "The friction current at the setpoint velocity is fed forward, 11.75 ms after the setpoint.",
+        f"ballbar --controller gpc --compare {','.join(in_x_and_y(feedforward__friction=1))}",
+        lambda preset, compensated: [
+            *circle_rows(preset, PRESET, "almost 0 (right)", "−0.4 ± 0.2", "−8.5 ± 1", "13.2 ± 1"),
+            *circle_rows(compensated, "same tuning with friction compensation", "—", "—", "−1.4", "0.4"),
+        ],
+    ),
+    *(
+        (
+            f"Figure 11: corner of {turn}°",
+            "Two legs of 50 mm at 10 m/min, from rest to rest, without a pause between them.",
+            f"corner-{turn}",
+            partial(lambda run, value: [corner_row(run, value), *contour_rows(run)], value=value),
+        )
+        for turn, value in (("90", "146.6"), ("45", "103.7"))
+    ),
+    *(
+        (
+            f"Figure 11: corner of {turn}° under predictive control",
+            f"The same corner as above, where the cascade has {cascade} µm, with the tunings of figure 10.",
+            predictive(f"corner-{turn}"),
+            partial(
+                lambda *runs, values: [
+                    corner_row(run, value, f"{title}: ")
+                    for title, value, run in zip(TUNINGS, values, runs, strict=True)
+                ],
+                values=values,
+            ),
+        )
+        for turn, cascade, *values in (("90", "146.6", "6.6", "13.1"), ("45", "103.7", "4.0", "14.8"))
+    ),
+    *(
+        (
+            f"Section 6, objective of the paper: {name}",
+            f"{text}: the geometric error caused by the drives, in the workpiece frame.",
+            name,
+            path_rows,
+        )
+        for name, text in (
+            ("five-axis", "The tool tip along a path in the workpiece while A and C turn"),
+            ("bspline-5x", "The tool tip along a spatial B-spline while A and C turn"),
+        )
+    ),
+]
+"""Title, text, command, and function from the runs to the rows of each figure of the paper."""
 
 
 def page() -> str:
     """Returns the whole page."""
-    parts = [HEAD]
-    validated = "measured and simulated agree to {}"
-    [single] = run("x-constant")
-    rows = axis_rows(single, "x", ("218.9", "14.40"), validated.format("4 µm, during acceleration to 6 µm"))
-    parts.append(
-        section(
-            "Figure 6: one axis at constant velocity",
-            "X over 200 mm at 10 m/min; the paper prints neither length nor feed.",
-            "x-constant",
-            rows,
-        )
-    )
-    others = (("y", ("230.5", "12.40")), ("z", ("102.7", "11.50")), ("a", ("35.0", "2.37")), ("c", ("35.4", "1.76")))
-    for axis, specified in others:
-        [single] = run(f"{axis}-constant")
-        turn = ", 90° at 10 rpm" if axis in "ac" else ""
-        text = f"The same trial on {axis.upper()}{turn}; the paper has no figure of it."
-        parts.append(
-            section(f"Section 4.1: {axis.upper()}", text, f"{axis}-constant", axis_rows(single, axis, specified))
-        )
-    [single] = run("c-two-speeds")
-    rows = axis_rows(single, "c", ("—", "—"), validated.format("0.006°"))
-    parts.append(
-        section(
-            "Figure 7: two velocities on C",
-            "0 to 130° at 18 rpm, then to 210° at 6 rpm, reached at 130°.",
-            "c-two-speeds",
-            rows,
-        )
-    )
-    [single] = run("x-there-and-back")
-    parts.append(
-        section(
-            "Section 4.1, case 3: reciprocating motion",
-            "X over 200 mm and back at 10 m/min.",
-            "x-there-and-back",
-            axis_rows(single, "x", ("—", "—")),
-        )
-    )
-    figure_8 = (
-        ("a", "contour-a", "a closed polygon, stopping at the corners"),
-        ("b", "contour-b", "two lines joined by half circles"),
-        ("c", "orientation-ac", "A and C turn together; the shape is assumed"),
-        ("d", "bspline-3d", "a cubic B-spline in X, Y and Z; its control points are assumed"),
-    )
-    for letter, name, text in figure_8:
-        [single] = run(name)
-        parts.append(
-            section(
-                f"Figure 8 {letter}: {name}",
-                f"{text[0].upper()}{text[1:]}. In the paper "
-                f"{validated.format('5 µm or 0.005°, on the spline to 12 µm')}.",
-                name,
-                following_error_rows(single) + contour_rows(single),
-            )
-        )
-    command = "ballbar --controller cascade,cascade-noff"
-    cascade, without = run(command)
-    rows = circle_rows(cascade, "50 (left)", ("49.0 ± 0.2", "47.7 ± 1", "68.6 ± 1"))
-    rows += circle_rows(without, "—", ("−283.1 ± 0.2", "−284.4 ± 1", "−263.5 ± 1"))
-    parts.append(
-        section(
-            "Figure 10, left: the ballbar",
-            "A circle of 150 mm radius at 15 m/min, two turns at full feed. The paper's unit is misprinted as mm.",
-            command,
-            rows,
-        )
-    )
-    stiff, soft = run(predictive("ballbar"))
-    rows = circle_rows(stiff, "almost 0 (right)", ("0.0 ± 0.2", "−9.5 ± 1", "10.4 ± 1"), TUNINGS[0])
-    rows += circle_rows(soft, "almost 0 (right)", ("−1.6 ± 0.2", "−10.4 ± 1", "10.9 ± 1"), TUNINGS[1])
-    parts.append(
-        section(
-            "Figure 10, right: the ballbar under predictive control",
-            "The rows contain N1, N2, Nu and λ_rel; the paper does not print its tuning. The extremes are reversal "
-            "spikes at the friction reversals in the quadrants.",
-            predictive("ballbar"),
-            rows,
-        )
-    )
-    command = f"ballbar --controller gpc --compare {','.join(in_x_and_y(feedforward__friction=1))}"
-    preset, compensated = run(command)
-    rows = circle_rows(preset, "almost 0 (right)", ("−0.4 ± 0.2", "−8.5 ± 1", "13.2 ± 1"), PRESET)
-    rows += circle_rows(compensated, "—", ("—", "−1.4", "0.4"), "same tuning with friction compensation")
-    parts.append(
-        section(
-            "Figure 10, right: tuning of the machine file, and friction compensation",
-            "The friction current at the setpoint velocity is fed forward, 11.75 ms after the setpoint.",
-            command,
-            rows,
-        )
-    )
-    for turn, specified in (("90", "146.6"), ("45", "103.7")):
-        [single] = run(f"corner-{turn}")
-        corner = single["corners"][0]
-        rows = [("largest contour error at the corner, µm", "—", specified, number(corner["max_contour_error_um"]))]
-        parts.append(
-            section(
-                f"Figure 11: corner of {turn}°",
-                "Two legs of 50 mm at 10 m/min, from rest to rest, without a pause between them.",
-                f"corner-{turn}",
-                rows + contour_rows(single),
-            )
-        )
-    for turn, cascade, specified in (("90", "146.6", ("6.6", "13.1")), ("45", "103.7", ("4.0", "14.8"))):
-        command = predictive(f"corner-{turn}")
-        rows = [
-            (
-                f"{title}: largest contour error at the corner, µm",
-                "—",
-                value,
-                number(single["corners"][0]["max_contour_error_um"]),
-            )
-            for title, value, single in zip(TUNINGS, specified, run(command), strict=True)
-        ]
-        parts.append(
-            section(
-                f"Figure 11: corner of {turn}° under predictive control",
-                f"The same corner as above, where the cascade has {cascade} µm, with the tunings of figure 10.",
-                command,
-                rows,
-            )
-        )
-    for name, text in (
-        ("five-axis", "The tool tip along a path in the workpiece while A and C turn"),
-        ("bspline-5x", "The tool tip along a spatial B-spline while A and C turn"),
-    ):
-        [single] = run(name)
-        parts.append(
-            section(
-                f"Section 6, objective of the paper: {name}",
-                f"{text}: the geometric error caused by the drives, in the workpiece frame.",
-                name,
-                following_error_rows(single) + contour_rows(single),
-            )
-        )
-    return "".join(parts)
+    parts = [HEAD.rstrip("\n")]
+    for title, text, command, rows in SECTIONS:
+        text = textwrap.fill(text, WIDTH, break_on_hyphens=False)
+        parts += [f"\n## {title}\n", text, f"\n    virtual_axes run {command}\n"]
+        parts += ["| what | paper | specified | here |", "|---|---|---|---|", *rows(*run(command))]
+    return "\n".join(parts) + "\n"
 
 
 def deviations(text: str) -> list[str]:

@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
-# Creates the Python environment inside the checkout: .venv (rclpy, the message generators and
-# the module virtual_axes_py built from crates/py), .build/install (the messages of this package, and the interfaces
+# Creates the Python environment inside the checkout: .venv (rclpy, the message generators, packages of the tests, and
+# the module virtual_axes_py as cargo builds it), .build/install (the messages of this package, and the interfaces
 # of control_msgs that the node uses)
 # and .build/env.sh, which activates both in a shell.
 #
-#     tools/setup.sh [--browser] && source .build/env.sh
+#     tools/setup.sh [--demo] [--browser] && source .build/env.sh
 #
+# With --demo, only what ./demo.sh needs: rclpy, the messages of this package, and packages for figures.
 # With --browser, apt-get also installs Chromium and iptables for tests that need them, where that is possible.
 # Another run repeats only stages with changed inputs: each stage ends by writing a stamp with the
 # hash of its inputs, so an aborted stage starts again from the beginning.
@@ -23,12 +24,13 @@ fail() {
   exit 1
 }
 
-browser=false
+browser=false demo=false
 for argument in "$@"; do
   case $argument in
     --browser) browser=true ;;
+    --demo) demo=true ;;
     -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" && exit ;;
-    *) fail "unknown option $argument; allowed: --browser, --help" ;;
+    *) fail "unknown option $argument; allowed: --demo, --browser, --help" ;;
   esac
 done
 
@@ -95,6 +97,15 @@ install_network_tools() {
     echo "setup: no iptables or ip (Debian: apt-get install iptables iproute2): the tests of two hosts are skipped" >&2
 }
 
+# Unpacks libfaketime, which sets the wall clock of the node under test; without it, those tests are skipped.
+unpack_faketime() {
+  local folder=$build/faketime
+  [ ! -e "$folder/usr" ] && command -v apt-get dpkg >/dev/null || return 0
+  mkdir -p "$folder"
+  (cd "$folder" && apt-get download -q libfaketime && dpkg -x libfaketime_*.deb .) >"$logs/faketime.log" 2>&1 ||
+    echo "setup: no libfaketime (apt-get download libfaketime): the tests of the wall clock are skipped" >&2
+}
+
 # The CMake files of the wheels contain directories of their build machine.
 fix_cmake_paths() {
   local include numpy
@@ -107,28 +118,41 @@ fix_cmake_paths() {
   done
 }
 
+# Modules are compiled where they are imported.
+install_packages() { # file of requirements
+  "$venv/bin/python" -m pip install --disable-pip-version-check --prefer-binary --no-compile -r "$1"
+}
+
 make_venv() {
   rm -rf "$venv"
   "$python" -m venv "$venv"
   touch "$venv/COLCON_IGNORE"
-  "$venv/bin/python" -m pip install --disable-pip-version-check --prefer-binary -r test_py/requirements.txt
+  install_packages test_py/requirements-demo.txt
   fix_cmake_paths
-  "$venv/bin/python" -c 'import matplotlib, numpy, pytest, rclpy'
+  "$venv/bin/python" -c 'import matplotlib, numpy, rclpy'
+}
+
+add_packages() {
+  install_packages test_py/requirements.txt
+  "$venv/bin/python" -c 'import pandas, pytest'
+}
+
+# Builds the messages of a package below .build/messages into .build/install.
+build_messages() { # folder
+  PATH=$venv/bin:$PATH VIRTUAL_ENV=$venv AMENT_PREFIX_PATH=$venv CMAKE_PREFIX_PATH=$venv PYTHONPATH='' \
+    COLCON_HOME=$build/colcon "$venv/bin/colcon" --log-base "$logs/colcon" build --merge-install \
+    --paths "$build/messages/$1" --build-base "$build/messages/build" --install-base "$build/install" \
+    --cmake-args -G Ninja -DPython3_EXECUTABLE="$venv/bin/python" -DBUILD_TESTING=OFF \
+    -DVIRTUAL_AXES_BUILD_NODE=OFF -DCMAKE_BUILD_TYPE=Release
 }
 
 make_messages() {
   # From a copy: CMake refuses to export include directories (.venv's) below the source directory.
-  local source=$build/messages/src
+  local source=$build/messages/virtual_axes
   rm -rf "$build/install" "$build/messages"
   mkdir -p "$source"
   cp -r package.xml CMakeLists.txt msg "$source"
-  # Beside it: colcon does not search for packages inside packages.
-  cp -r "$overlay" "$build/messages"
-  PATH=$venv/bin:$PATH VIRTUAL_ENV=$venv AMENT_PREFIX_PATH=$venv CMAKE_PREFIX_PATH=$venv PYTHONPATH='' \
-    COLCON_HOME=$build/colcon "$venv/bin/colcon" --log-base "$logs/colcon" build --merge-install \
-    --paths "$source" "$build/messages/control_msgs" --build-base "$build/messages/build" --install-base "$build/install" \
-    --cmake-args -G Ninja -DPython3_EXECUTABLE="$venv/bin/python" -DBUILD_TESTING=OFF \
-    -DVIRTUAL_AXES_BUILD_NODE=OFF -DCMAKE_BUILD_TYPE=Release
+  build_messages virtual_axes
   cat >"$build/env.sh" <<END
 # Written by tools/setup.sh: source it to use rclpy and the messages of virtual_axes.
 export PATH="$venv/bin:\$PATH"
@@ -137,16 +161,23 @@ export LD_LIBRARY_PATH="$build/install/lib:$venv/lib\${LD_LIBRARY_PATH:+:\$LD_LI
 export PYTHONPATH="$(echo "$build"/install/lib/python3*/site-packages)"
 END
   # shellcheck source=/dev/null
-  (source "$build/env.sh" && python -c 'from virtual_axes.msg import DriveStates, MotorCurrents, TrajectoryResult
-from control_msgs.action import FollowJointTrajectory')
+  (source "$build/env.sh" && python -c 'from virtual_axes.msg import DriveStates, MotorCurrents, TrajectoryResult')
 }
 
-# Builds and installs the Python module of the simulation; `pip install .` does the same with a build environment.
+make_overlay() {
+  rm -rf "$build/messages/control_msgs"
+  cp -r "$overlay" "$build/messages"
+  build_messages control_msgs
+  # shellcheck source=/dev/null
+  (source "$build/env.sh" && python -c 'from control_msgs.action import FollowJointTrajectory')
+}
+
+# Links the Python module to cargo's output, which is built with the programs; `pip install .` builds a wheel of it.
 make_module() {
   command -v cargo >/dev/null || fail "needs cargo, Rust's build tool (https://rustup.rs)"
-  rm -rf "$build/wheel"
-  PATH=$venv/bin:$PATH "$venv/bin/python" -m pip wheel --disable-pip-version-check --no-deps --no-build-isolation -w "$build/wheel" .
-  "$venv/bin/python" -m pip install --disable-pip-version-check --no-deps --force-reinstall "$build"/wheel/*.whl
+  cargo build --release --workspace --locked
+  ln -sfn "$(realpath "${CARGO_TARGET_DIR:-target}")/release/lib_native.so" crates/py/python/virtual_axes_py/_native.abi3.so
+  echo "$root/crates/py/python" >"$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/virtual_axes_py.pth"
   (cd / && "$venv/bin/python" -c 'import virtual_axes_py; virtual_axes_py.Machine.load()')
 }
 
@@ -159,13 +190,13 @@ is_done() { # stamp file, hash
   [ -f "$1" ] && [ "$(cat "$1")" = "$2" ]
 }
 
-venv_hash=$(hash_of tools/setup.sh test_py/requirements.txt test_py/constraints.txt)
-messages_hash=$(hash_of tools/setup.sh test_py/requirements.txt test_py/constraints.txt package.xml CMakeLists.txt msg/*.msg msg/action/*.action \
-  "$overlay"/package.xml "$overlay"/CMakeLists.txt "$overlay"/*/*.msg "$overlay"/*/*.action)
-mapfile -t module_sources < <(find pyproject.toml Cargo.toml Cargo.lock crates -type f -not -path '*/tests/*' | LC_ALL=C sort)
-module_hash=$(hash_of tools/setup.sh test_py/requirements.txt test_py/constraints.txt "${module_sources[@]}")
-module_stamp=$build/module.stamp
+venv_hash=$(hash_of tools/setup.sh test_py/requirements-demo.txt test_py/constraints.txt)
+messages_hash=$(hash_of tools/setup.sh test_py/requirements-demo.txt test_py/constraints.txt package.xml CMakeLists.txt msg/*.msg msg/action/*.action)
+packages_hash=$(hash_of test_py/requirements*.txt test_py/constraints.txt)
+overlay_hash=$(hash_of "$overlay"/package.xml "$overlay"/CMakeLists.txt "$overlay"/*/*.msg "$overlay"/*/*.action)
 venv_stamp=$venv/setup.stamp
+packages_stamp=$venv/packages.stamp
+overlay_stamp=$build/overlay.stamp
 messages_stamp=$build/messages.stamp
 
 mkdir -p "$logs"
@@ -175,19 +206,25 @@ if command -v flock >/dev/null; then flock 8; fi
 
 if ! is_done "$venv_stamp" "$venv_hash" || ! "$venv/bin/python" -c '' 2>/dev/null; then
   check_tools
-  rm -f "$messages_stamp" "$module_stamp"
+  rm -f "$messages_stamp"
   step "Python packages into .venv" venv make_venv
   echo "$venv_hash" >"$venv_stamp"
 fi
 if ! is_done "$messages_stamp" "$messages_hash"; then
   check_tools
-  rm -f "$messages_stamp"
+  rm -f "$messages_stamp" "$overlay_stamp"
   step "messages into .build" messages make_messages
   echo "$messages_hash" >"$messages_stamp"
 fi
-if ! is_done "$module_stamp" "$module_hash"; then
-  rm -f "$module_stamp"
-  step "virtual_axes_py into .venv" module make_module
-  echo "$module_hash" >"$module_stamp"
+if $demo; then exit; fi
+if ! is_done "$packages_stamp" "$packages_hash"; then
+  step "Python packages of the tests into .venv" packages add_packages
+  echo "$packages_hash" >"$packages_stamp"
 fi
+if ! is_done "$overlay_stamp" "$overlay_hash"; then
+  step "control_msgs into .build" overlay make_overlay
+  echo "$overlay_hash" >"$overlay_stamp"
+fi
+unpack_faketime
+step "virtual_axes_py into .venv" module make_module
 if $browser; then install_browser; install_network_tools; fi

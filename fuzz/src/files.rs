@@ -6,7 +6,7 @@ use virtual_axes_core::trajectory::{Trajectory, ValidationContext};
 use virtual_axes_identify::recording::{Conditioning, Finding, RawRecording, condition};
 use virtual_axes_io::files::{
     Columns, McapTrajectories, PsecCsvReader, PsecCsvWriter, RecordingFormat, RecordingOptions,
-    inspect_recording_stream, read_psec_yaml, read_recording_csv, read_recording_mcap, read_recording_stream,
+    inspect_recording_stream, read_psec_yaml, read_recording_mcap, read_recording_stream,
 };
 use virtual_axes_io::messages;
 
@@ -163,9 +163,9 @@ fn set_columns<'a>(data: &'a [u8], options: &mut RecordingOptions) -> &'a [u8] {
 
 /// Reads a recording in CSV; text before a line `---` assigns the columns.
 pub fn recording_csv(data: &[u8]) {
-    let mut options = RecordingOptions::default();
+    let mut options = RecordingOptions { format: Some(RecordingFormat::Csv), ..RecordingOptions::default() };
     let body = set_columns(data, &mut options);
-    bounded(data.len(), || match read_recording_csv(body, "my.csv", &MACHINE.axes()[0], &options) {
+    bounded(data.len(), || match read_recording_stream(body, "my.csv", &MACHINE.axes()[0], &options) {
         Ok(read) => check_recording(read),
         Err(error) => assert_one_line(&error.to_string()),
     });

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use byteorder::{BigEndian, LittleEndian};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use virtual_axes::ingress::parameters::{
+use virtual_axes::validation::parameters::{
     LiveNodeParameters, ParameterStore, check_count, descriptor_to_wire, list_parameters,
     parameter_from_wire, result_to_wire, type_number, value_to_wire,
 };
-use virtual_axes::ingress::{
+use virtual_axes::validation::{
     CancelCandidate, GoalValidator, ReorderFilter, StreamSetpoints, TrajectoryValidator, loads,
     select_goals_to_cancel,
 };

@@ -5,12 +5,14 @@ mod files;
 mod graph;
 mod motion;
 mod part_program;
+mod sinumerik_program;
 mod text;
 
 pub use files::{psec_csv, psec_mcap, psec_yaml, recording_control, recording_csv, recording_mcap};
 pub use graph::{cdr_goal, cdr_joint_state, cdr_other, cdr_parameters, cdr_psec};
 pub use motion::trajectory;
 pub use part_program::part_program;
+pub use sinumerik_program::sinumerik_program;
 pub use text::{machine_file, parameter_text, ros_args, scenario};
 
 use std::sync::LazyLock;

@@ -1,4 +1,4 @@
-//! Fuzz target of part programs: interpretation, then look-ahead and feed planning.
+//! Fuzz target of part programs: interpretation in each dialect, then look-ahead and feed planning.
 
 use std::borrow::Cow;
 use std::io::Cursor;
@@ -6,7 +6,7 @@ use std::io::Cursor;
 use virtual_axes_core::config::{MachineConfig, ValueSource};
 use virtual_axes_core::path::LimitUse;
 use virtual_axes_core::units::seconds;
-use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions};
+use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions};
 use virtual_axes_nc::motion::ProgramStep;
 use virtual_axes_nc::plan::{PartProgramPlanner, PlanOptions};
 
@@ -29,7 +29,9 @@ const TOLERANCE: f64 = 1e-6;
 pub fn part_program(data: &[u8]) {
     let machine = machine(data);
     bounded(data.len(), || {
-        interpret(data, &machine);
+        for dialect in Dialect::ALL {
+            interpret(data, &machine, dialect);
+        }
         plan(data, &machine);
     });
 }
@@ -50,15 +52,23 @@ fn machine(data: &[u8]) -> Cow<'static, MachineConfig> {
     Cow::Owned(parameters.machine_config().expect("what is accepted is valid"))
 }
 
-fn interpreter<'a>(data: &'a [u8], machine: &MachineConfig) -> Interpreter<Cursor<&'a [u8]>> {
-    let options =
-        InterpreterOptions { repeated_lines: REPEATED_LINES, ..InterpreterOptions::for_machine(machine) };
+/// Returns the interpreter of a program; without a dialect it is detected.
+fn interpreter<'a>(
+    data: &'a [u8],
+    machine: &MachineConfig,
+    dialect: Option<Dialect>,
+) -> Interpreter<Cursor<&'a [u8]>> {
+    let options = InterpreterOptions {
+        dialect,
+        repeated_lines: REPEATED_LINES,
+        ..InterpreterOptions::for_machine(machine)
+    };
     Interpreter::new(Cursor::new(data), "part.nc", options)
 }
 
 /// Interprets a program and asserts that its coordinates are finite.
-fn interpret(data: &[u8], machine: &MachineConfig) {
-    for step in interpreter(data, machine).take(MAX_STEPS) {
+fn interpret(data: &[u8], machine: &MachineConfig, dialect: Dialect) {
+    for step in interpreter(data, machine, Some(dialect)).take(MAX_STEPS) {
         match step {
             Ok(ProgramStep::Motion(motion)) => {
                 let mut values = motion.start.iter().chain(&motion.end);
@@ -75,7 +85,7 @@ fn interpret(data: &[u8], machine: &MachineConfig) {
 
 /// Plans a program and asserts that its setpoints are within the limits of the axes.
 fn plan(data: &[u8], machine: &MachineConfig) {
-    let steps = interpreter(data, machine).take(MAX_PLANNED_STEPS);
+    let steps = interpreter(data, machine, None).take(MAX_PLANNED_STEPS);
     let mut planner = match PartProgramPlanner::new(steps, machine, PlanOptions::default()) {
         Ok(planner) => planner,
         Err(error) => return assert_one_line(&error.to_string()),
@@ -90,7 +100,7 @@ fn plan(data: &[u8], machine: &MachineConfig) {
         };
         let time = cycle as f64 * period;
         for ((axis, &psec), window) in machine.axes().iter().zip(setpoint.psec()).zip(&mut windows) {
-            assert!(psec.is_finite(), "line {}: {} at {psec}", setpoint.line, axis.name());
+            assert!(psec.is_finite(), "line {}: {} at {psec}", setpoint.place.line, axis.name());
             let window = window.get_or_insert([psec; LimitUse::WINDOW]);
             window.rotate_left(1);
             window[LimitUse::WINDOW - 1] = psec;
@@ -98,7 +108,7 @@ fn plan(data: &[u8], machine: &MachineConfig) {
                 assert!(
                     used.ratio() <= 1.0 + TOLERANCE,
                     "line {}: {}: {used:?} at {time} s",
-                    setpoint.line,
+                    setpoint.place.line,
                     axis.name()
                 );
             }

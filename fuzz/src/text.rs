@@ -1,6 +1,6 @@
 //! Fuzz targets of text inputs: machine files, parameters, scenarios, ROS arguments.
 
-use virtual_axes::ingress::args::Command;
+use virtual_axes::validation::args::Command;
 use virtual_axes_core::config::{Parameters, ValueSource};
 use virtual_axes_core::machine::MachineParameters;
 use virtual_axes_core::scenario::Scenario;

@@ -11,7 +11,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 ROS = Path("/opt/ros/jazzy")
-STANDIN = ROOT / "test_py" / "ros2_standin"
+STANDIN = ROOT / "test_py" / "ros2_standin.py"
 
 LEFT_SECONDS = 3600
 """Age from which a copy of cargo's output is a remainder."""
@@ -141,7 +141,7 @@ class Place:
         if self._ros is None:
             self._ros = self.directory / "opt" / "ros" / "jazzy"
             self._make_ros(self._ros)
-            self.standins |= {"/opt/ros/jazzy: packages from PyPI", "ros2, launch: test_py/ros2_standin"}
+            self.standins |= {"/opt/ros/jazzy: packages from PyPI", "ros2: test_py/ros2_standin.py"}
         return self._ros
 
     def _make_ros(self, ros: Path) -> None:

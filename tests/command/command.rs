@@ -387,7 +387,9 @@ fn peak_memory(folder: &TestFolder, seconds: u32) -> u64 {
 #[test]
 fn memory_is_independent_of_the_number_of_setpoints() {
     let folder = TestFolder::new("memory");
-    let (short, long) = (peak_memory(&folder, 60), peak_memory(&folder, 600));
+    // A run can end after the last sample of its peak, so that a single short run appears smaller.
+    let short = (0..5).map(|_| peak_memory(&folder, 60)).max().unwrap_or_default();
+    let long = peak_memory(&folder, 600);
     println!("{short} kB for a minute, {long} kB for ten");
     assert!(short > 0, "memory can be read");
     // In memory, ten minutes of five axes are 4 MB of setpoints.

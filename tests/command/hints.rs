@@ -113,6 +113,6 @@ fn an_arc_with_one_coordinate_of_its_center_is_rejected() {
 
 #[test]
 fn a_file_of_no_known_kind_names_the_extensions_of_part_programs() {
-    let words = ["the first line is \"G0 X10\"", "part programs have the extension nc, ngc, tap, "];
-    assert_file_rejected("program.txt", "G0 X10\n", &words);
+    let words = ["the first line is \"some notes\"", "part programs have the extension nc, ngc, tap, "];
+    assert_file_rejected("notes.txt", "some notes\nabout the part\n", &words);
 }

@@ -65,7 +65,7 @@ fn without_axis_the_columns_and_the_next_command_are_listed() {
         }
     }
     let next = format!(
-        "next: virtual_axes identify {} --axis all --machine {} --out identified.yaml\n",
+        "next: virtual_axes identify {} --axis all --machine {} --out identified.yaml --report identified.html\n",
         files.trace, files.machine
     );
     assert!(text.contains(&next), "{text}");

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use crate::command_common::{assert_rejected, json, printed};
-use virtual_axes::interface::{SERVICES, TOPICS};
-use virtual_axes_core::config::{DEFINITIONS, listing};
+use virtual_axes::ros_interface::{SERVICES, TOPICS};
+use virtual_axes_core::config::{ControllerName, DEFINITIONS, listing};
 use virtual_axes_core::trajectory::RejectionCode;
 
 #[test]
@@ -49,11 +49,21 @@ fn rejection_codes_are_numbered_from_one_without_gap() {
 }
 
 #[test]
+fn the_launch_files_offer_every_controller() {
+    let names: Vec<String> = ControllerName::ALL.iter().map(|name| format!("\"{name}\"")).collect();
+    let choices = format!("[\"as_machine\", {}]", names.join(", "));
+    for file in ["virtual_axes", "two_machines", "ros2_control"] {
+        let path = format!("{}/launch/{file}.launch.py", env!("CARGO_MANIFEST_DIR"));
+        assert!(std::fs::read_to_string(&path).expect(&path).contains(&choices), "{path}: {choices}");
+    }
+}
+
+#[test]
 fn the_json_of_the_parameters_has_every_definition() {
     let list = json(&["parameters", "--json"]);
     let list = list.as_array().expect("a list");
     assert_eq!(list.len(), DEFINITIONS.len());
-    for (entry, definition) in list.iter().zip(DEFINITIONS) {
+    for (entry, definition) in list.iter().zip(DEFINITIONS.iter()) {
         assert_eq!(entry["key"], listing::key(definition));
         assert_eq!(entry["default"].is_null(), definition.default_value().is_none(), "{}", entry["key"]);
     }

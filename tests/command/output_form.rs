@@ -2,7 +2,6 @@
 
 use std::process::{Command, Output};
 
-use virtual_axes_core::scenario::Scenario;
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
 /// Largest length of a line, characters.
@@ -38,7 +37,7 @@ fn assert_fits(arguments: &[&str]) {
 
 #[test]
 fn tables_fit_a_terminal_of_100_columns() {
-    for scenario in Scenario::builtin_names() {
+    for (scenario, _) in virtual_axes_builtin::SCENARIOS {
         assert_fits(&["run", scenario]);
     }
     assert_fits(&["run", "corner-90", "--controller", "cascade,cascade-noff,gpc"]);

@@ -60,10 +60,9 @@ fn the_written_machine_has_the_printed_cost() {
         assert_eq!(machine.matches(&tuned).count(), 2, "{machine}");
         assert!(machine.contains("gain: 4.75\n"), "{machine}");
         let page = text(&page);
-        for part in ["<h2>Search</h2>", "Cost against modulus margin", "class=\"mark run-2\"", "initial"] {
+        for part in ["<h2>Search</h2>", "Cost against modulus margin", "Pareto front", "initial"] {
             assert!(page.contains(part), "{part}");
         }
-        assert!(!page.contains("NaN") && !page.contains("inf"));
     }
     assert_eq!(folder.names().len(), 5);
 }
@@ -192,7 +191,7 @@ fn invalid_options_are_rejected_by_name() {
         (vec!["--also", "no-such"], vec!["no-such"]),
         (vec!["--out", corner], vec!["corner.yaml", "would replace an input file"]),
         (vec!["--out", &page], vec![".html", "YAML"]),
-        (vec!["--out", out, "--report", out], vec!["out.yaml", "machine", "report"]),
+        (vec!["--out", out, "--report", out], vec!["out.yaml", "--out", "--report", "different files"]),
         (vec!["--report", out], vec!["out.yaml", ".html"]),
         (vec!["--machine", out], vec!["out.yaml"]),
         (vec!["--modulus-margin", "0.999"], vec!["corner.yaml", "0.999", "largest modulus margin"]),

@@ -78,7 +78,12 @@ unsafe fn create(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn va_create(name: *const c_char, machine: *mut *mut VaMachine) -> VaStatus {
     // SAFETY: the caller promises text and pointer.
-    unsafe { create(machine, || Parameters::load(text(name, "name")?).map_err(BorderError::invalid)) }
+    unsafe {
+        create(machine, || {
+            Parameters::load(text(name, "name")?, virtual_axes_builtin::MACHINES)
+                .map_err(BorderError::invalid)
+        })
+    }
 }
 
 /// Creates a machine from the text of a machine file; `source` names it in errors.

@@ -2,7 +2,7 @@
 
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::machine::{Machine, check_input};
-use virtual_axes_core::state_codec::checksum;
+use virtual_axes_core::state_codec::{SealedBytes, seal};
 
 use crate::border::{BorderError, VaStatus, guard, reference, reference_mut};
 use crate::machine::{VaMachine, discretize};
@@ -21,27 +21,23 @@ impl VaState {
         bytes.extend((self.preview.len() as u64).to_le_bytes());
         bytes.extend(self.preview.iter().flat_map(|setpoint| setpoint.to_le_bytes()));
         bytes.extend(self.machine.state_bytes());
-        bytes.extend(checksum(&bytes).to_le_bytes());
+        seal(&mut bytes);
         bytes
     }
 
     fn from_bytes(machine: &VaMachine, bytes: &[u8]) -> Result<Self, BorderError> {
         let size = bytes.len();
         let damaged = || BorderError::invalid(format!("the state of {size} bytes is truncated or damaged"));
-        let Some(rest) = bytes.strip_prefix(&HEAD) else {
+        if !bytes.starts_with(&HEAD) {
             let reason = format!(
                 "the {size} bytes are no state of this version; va_state_read reads what va_state_write of the same \
                  version has written"
             );
             return Err(BorderError::invalid(reason));
-        };
-        let (content, found) = bytes.split_last_chunk().ok_or_else(damaged)?;
-        if checksum(content) != u64::from_le_bytes(*found) || rest.len() < found.len() {
-            return Err(damaged());
         }
-        let mut reader = Reader(&rest[..rest.len() - found.len()]);
-        let yaml = reader.bytes(1).and_then(|text| std::str::from_utf8(text).ok()).ok_or_else(damaged)?;
-        let preview = reader.bytes(size_of::<f64>()).ok_or_else(damaged)?;
+        let mut reader = SealedBytes::open(bytes, &HEAD).ok_or_else(damaged)?;
+        let yaml = reader.counted(1).and_then(|text| std::str::from_utf8(text).ok()).ok_or_else(damaged)?;
+        let preview = reader.counted(size_of::<f64>()).ok_or_else(damaged)?;
         let preview = preview.chunks_exact(size_of::<f64>()).filter_map(|setpoint| setpoint.try_into().ok());
         let preview: Vec<f64> = preview.map(f64::from_le_bytes).collect();
         let parameters = Parameters::from_yaml(yaml, "state").map_err(BorderError::invalid)?;
@@ -57,25 +53,11 @@ impl VaState {
         }
         Ok(VaState {
             names: machine.names.clone(),
-            machine: Machine::from_state_bytes(discretize(&config)?, reader.0)
+            machine: Machine::from_state_bytes(discretize(&config)?, reader.rest())
                 .map_err(BorderError::invalid)?,
             parameters,
             preview,
         })
-    }
-}
-
-/// Rest of the bytes of a state.
-struct Reader<'a>(&'a [u8]);
-
-impl<'a> Reader<'a> {
-    /// Returns bytes behind their number, which is given in units of `unit` bytes.
-    fn bytes(&mut self, unit: usize) -> Option<&'a [u8]> {
-        let (count, rest) = self.0.split_first_chunk()?;
-        let length = usize::try_from(u64::from_le_bytes(*count)).ok()?.checked_mul(unit)?;
-        let (found, rest) = rest.split_at_checked(length)?;
-        self.0 = rest;
-        Some(found)
     }
 }
 

@@ -15,7 +15,9 @@ const CYCLES: usize = 300;
 
 /// Returns the positions of the motion of smoke.c.
 fn positions() -> Vec<[f64; AXES]> {
-    let config = Parameters::builtin("mikron_ucp710").and_then(|p| p.machine_config()).expect("valid");
+    let config = Parameters::load("mikron_ucp710", virtual_axes_builtin::MACHINES)
+        .and_then(|p| p.machine_config())
+        .expect("valid");
     let mut machine = Machine::new(Arc::new(MachineParameters::new(&config).expect("can be discretized")));
     let setpoint = |cycle: usize, axis: usize| {
         (if axis < 3 { 0.01 } else { 0.2 }) * (if cycle < 150 { cycle as f64 / 150.0 } else { 1.0 })
@@ -45,12 +47,14 @@ fn a_c_program_gets_the_bits_of_the_library_and_an_error_for_each_bad_call() {
 const SANITIZERS: [&str; 3] = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
 
 #[test]
+#[ignore = "compiles with sanitizers: ./test.sh --all"]
 fn sanitizers_find_no_leak_and_no_invalid_access() {
     let output = Command::new(compile("tests/smoke.c", "sanitized", &SANITIZERS)).output().expect("it runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]
+#[ignore = "compiles with sanitizers: ./test.sh --all"]
 fn random_calls_in_any_order_return_a_status() {
     let program = compile("tests/random_calls.c", "random_calls", &SANITIZERS);
     for seed in ["1", "2", "3"] {
@@ -67,7 +71,9 @@ fn random_calls_in_any_order_return_a_status() {
 fn a_spring_computed_every_half_millisecond_has_the_position_of_the_library() {
     let program = compile("examples/spring.c", "spring", &[]);
     let output = Command::new(program).output().expect("it runs");
-    let config = Parameters::builtin("mikron_ucp710").and_then(|p| p.machine_config()).expect("valid");
+    let config = Parameters::load("mikron_ucp710", virtual_axes_builtin::MACHINES)
+        .and_then(|p| p.machine_config())
+        .expect("valid");
     let mut machine = Machine::new(Arc::new(MachineParameters::new(&config).expect("can be discretized")));
     for _ in 0..2000 {
         machine.set_load(0, -1e6 * machine.motion_at_end(0)[0]);

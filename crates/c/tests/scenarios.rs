@@ -8,6 +8,7 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 
 use c_program::{compile, folder, hexadecimal};
+use virtual_axes_builtin::SCENARIOS;
 use virtual_axes_core::config::{Parameters, ValueSource, parse_assignment};
 use virtual_axes_core::scenario::Scenario;
 use virtual_axes_core::simulation::joint_limits;
@@ -19,7 +20,7 @@ type Cycle = (Vec<f64>, Vec<f64>);
 /// Returns the position cycles of a scenario.
 fn cycles(parameters: &Parameters, name: &str) -> Vec<Cycle> {
     let config = parameters.machine_config().expect("a valid machine");
-    let scenario = Scenario::builtin(name).expect("built in");
+    let scenario = Scenario::load(name, SCENARIOS).expect("built in");
     let program = Arc::new(scenario.program(&config, None).expect("it can be planned"));
     let limits = joint_limits(&config, "");
     let source = ProgramSource::new(Arc::clone(&program), name, &limits, config.periods().position);
@@ -54,7 +55,8 @@ fn hexadecimal_text(value: f64) -> String {
 fn every_scenario_has_the_bits_of_the_simulation() {
     let program = compile("tests/replay.c", "replay", &[]);
     let file = folder().join("../../config/mikron_ucp710.yaml");
-    let cascade = Parameters::load(&file.to_string_lossy()).expect("a machine");
+    let cascade =
+        Parameters::load(&file.to_string_lossy(), virtual_axes_builtin::MACHINES).expect("a machine");
     let mut gpc = cascade.clone();
     let axes = ["x", "y", "z", "a", "c"];
     let source = ValueSource::named("test");
@@ -64,7 +66,7 @@ fn every_scenario_has_the_bits_of_the_simulation() {
     for (controller, parameters) in [("cascade", &cascade), ("gpc", &gpc)] {
         let machine = program.with_file_name(format!("{controller}.yaml"));
         std::fs::write(&machine, parameters.to_yaml("", |_| None)).expect("writable");
-        for name in Scenario::builtin_names() {
+        for (name, _) in SCENARIOS {
             let expected = cycles(parameters, name);
             let mut text = String::new();
             for (psec, _) in &expected {

@@ -37,6 +37,48 @@ pub fn checksum(bytes: &[u8]) -> u64 {
     hash.value()
 }
 
+/// Appends the checksum of all bytes, which [`SealedBytes`] checks.
+pub fn seal(bytes: &mut Vec<u8>) {
+    bytes.extend(checksum(bytes).to_le_bytes());
+}
+
+/// Reader of the bytes of a saved state between its head and its checksum.
+#[derive(Debug)]
+pub struct SealedBytes<'a>(&'a [u8]);
+
+impl<'a> SealedBytes<'a> {
+    /// Opens bytes that begin with `head` and end with their checksum; returns `None` for others.
+    pub fn open(bytes: &'a [u8], head: &[u8]) -> Option<Self> {
+        let (content, found) = bytes.split_last_chunk()?;
+        let is_valid = checksum(content) == u64::from_le_bytes(*found);
+        content.strip_prefix(head).filter(|_| is_valid).map(Self)
+    }
+
+    /// Returns the next `length` bytes.
+    pub fn bytes(&mut self, length: usize) -> Option<&'a [u8]> {
+        let (found, rest) = self.0.split_at_checked(length)?;
+        self.0 = rest;
+        Some(found)
+    }
+
+    /// Returns bytes behind their number, which is given in units of `unit` bytes.
+    pub fn counted(&mut self, unit: usize) -> Option<&'a [u8]> {
+        let count = u64::from_le_bytes(self.bytes(size_of::<u64>())?.try_into().ok()?);
+        self.bytes(usize::try_from(count).ok()?.checked_mul(unit)?)
+    }
+
+    /// Returns the next number, unless it is infinite or NaN.
+    pub fn number(&mut self) -> Option<f64> {
+        let bytes = self.bytes(size_of::<f64>())?.try_into().ok()?;
+        Some(f64::from_le_bytes(bytes)).filter(|value| value.is_finite())
+    }
+
+    /// Returns all further bytes.
+    pub fn rest(self) -> &'a [u8] {
+        self.0
+    }
+}
+
 /// Writer or reader of a state: both pass over its values in one order, in words of 8 bytes, little endian.
 #[derive(Debug)]
 pub(crate) enum StateCodec<'a> {

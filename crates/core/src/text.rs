@@ -7,6 +7,19 @@ const MAX_QUOTED_LENGTH: usize = 120;
 /// Minimum Jaro-Winkler similarity of a suggested name.
 const MIN_SIMILARITY: f64 = 0.7;
 
+/// Built-in files: name and text.
+pub type BuiltinFiles = [(&'static str, &'static str)];
+
+/// Returns the names of built-in files.
+pub fn builtin_names(files: &BuiltinFiles) -> impl Iterator<Item = &'static str> {
+    files.iter().map(|(name, _)| *name)
+}
+
+/// Returns the text of the built-in file `name`.
+pub fn builtin_text(files: &BuiltinFiles, name: &str) -> Option<&'static str> {
+    files.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+}
+
 /// Returns `text` on one line, truncated to 120 characters.
 pub fn shortened(text: &str) -> String {
     let mut out: String = text.chars().take(MAX_QUOTED_LENGTH).collect();
@@ -46,13 +59,19 @@ pub fn is_control(c: char) -> bool {
 pub fn nearest_name<T: AsRef<str>>(found: &str, known: impl IntoIterator<Item = T>) -> Option<String> {
     let found = shortened(found);
     let names = known.into_iter().map(|name| shortened(name.as_ref()));
-    let nearest = names.min_by_key(|name| damerau_levenshtein(&found, name))?;
-    (jaro_winkler(&found, &nearest) >= MIN_SIMILARITY).then_some(nearest)
+    let similar = names.filter(|name| jaro_winkler(&found, name) >= MIN_SIMILARITY);
+    similar.min_by_key(|name| damerau_levenshtein(&found, name))
 }
 
 /// Returns the end of a message about an unknown name: `; the nearest is NAME`, or an empty text.
 pub fn nearest_hint(nearest: &Option<String>) -> String {
     nearest.as_ref().map_or_else(String::new, |name| format!("; the nearest is {name}"))
+}
+
+/// Returns a message about an unknown name: `unknown "NAME"; known are …; the nearest is NAME`.
+pub fn unknown_name(found: &str, known: &[&str]) -> String {
+    let (name, hint) = (shortened(found), nearest_hint(&nearest_name(found, known)));
+    format!("unknown \"{name}\"; known are {}{hint}", known.join(", "))
 }
 
 /// Returns the words of `text` in lines of at most `width` characters; a longer word has a line of its own.

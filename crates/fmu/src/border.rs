@@ -1,10 +1,6 @@
 //! Border to the importer: types of FMI 2.0, checked pointers, logger.
 
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
-use crate::instance::FmuInstance;
-use crate::slave::Phase;
 
 /// `fmi2Status`, result of a function.
 #[repr(C)]
@@ -62,30 +58,6 @@ pub(crate) fn send(callbacks: &Fmi2Callbacks, name: &CStr, status: Fmi2Status, m
             category.as_ptr(),
             text.as_ptr(),
         );
-    }
-}
-
-/// Runs `body` on an instance; logs its error or panic and returns the status.
-///
-/// # Safety
-/// `component` is null or a live instance of this library that no other thread uses.
-pub(crate) unsafe fn call(
-    component: *mut FmuInstance,
-    body: impl FnOnce(&mut FmuInstance) -> Result<(), String>,
-) -> Fmi2Status {
-    // SAFETY: the caller promises a live instance of its own.
-    let Some(instance) = (unsafe { component.as_mut() }) else { return Fmi2Status::Error };
-    match catch_unwind(AssertUnwindSafe(|| body(instance))) {
-        Ok(Ok(())) => Fmi2Status::Ok,
-        Ok(Err(reason)) => {
-            instance.log(Fmi2Status::Error, &reason);
-            Fmi2Status::Error
-        }
-        Err(_) => {
-            instance.slave.phase = Phase::Broken;
-            instance.log(Fmi2Status::Fatal, "error of the library: call fmi2Reset or fmi2SetFMUstate");
-            Fmi2Status::Fatal
-        }
     }
 }
 

@@ -6,9 +6,12 @@ use std::fmt::Write;
 use virtual_axes_core::config::{Parameters, Value};
 use virtual_axes_core::state_codec::checksum;
 
+use crate::resources::MACHINE_FILE;
 use crate::units::base_unit;
 use crate::variables::{Causality, FmuType, FmuVariable, FmuVariables, text_value};
-use crate::{MACHINE_FILE, MODEL_IDENTIFIER};
+
+/// Name of the library in the archive, without extension, and `modelIdentifier` of the model description.
+pub const MODEL_IDENTIFIER: &str = "virtual_axes_fmu";
 
 /// Returns the identifier that connects model description, library and machine file: a hash of the text of the machine
 /// file and of all variables.
@@ -98,7 +101,7 @@ fn write_variable(out: &mut String, reference: usize, variable: &FmuVariable) {
         Causality::Output => " initial=\"calculated\"",
         Causality::FixedParameter | Causality::TunableParameter => " initial=\"exact\"",
     };
-    let kind = type_name(variable.kind);
+    let kind = variable.kind;
     let mut attributes = String::new();
     if !variable.unit.is_empty() && variable.kind == FmuType::Real {
         let _ = write!(attributes, " unit=\"{}\"", escaped(variable.unit));
@@ -112,7 +115,7 @@ fn write_variable(out: &mut String, reference: usize, variable: &FmuVariable) {
     let _ = writeln!(
         out,
         "<ScalarVariable name=\"{}\" valueReference=\"{reference}\" causality=\"{causality}\" \
-         variability=\"{variability}\"{initial} description=\"{}\"><{kind}{attributes}/></ScalarVariable>",
+         variability=\"{variability}\"{initial} description=\"{}\"><{kind:?}{attributes}/></ScalarVariable>",
         escaped(&variable.name),
         escaped(&variable.description),
     );
@@ -126,16 +129,6 @@ pub(crate) fn causality(variable: &FmuVariable) -> (&'static str, &'static str) 
         (Causality::Output, _) => ("output", "discrete"),
         (Causality::FixedParameter, _) => ("parameter", "fixed"),
         (Causality::TunableParameter, _) => ("parameter", "tunable"),
-    }
-}
-
-/// Returns the name of a type.
-pub(crate) fn type_name(kind: FmuType) -> &'static str {
-    match kind {
-        FmuType::Real => "Real",
-        FmuType::Integer => "Integer",
-        FmuType::Boolean => "Boolean",
-        FmuType::String => "String",
     }
 }
 

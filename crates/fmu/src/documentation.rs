@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use virtual_axes_core::config::Parameters;
 
-use crate::MACHINE_FILE;
-use crate::description::{causality, escaped, start_text, type_name};
+use crate::description::{causality, escaped, start_text};
+use crate::resources::MACHINE_FILE;
 use crate::variables::{FmuVariables, text_value};
 
 /// Returns a page with rules and variables of the FMU of the machine in a machine file.
@@ -36,9 +36,9 @@ pub fn documentation(machine_file: &str) -> Result<String, String> {
         // Writing to a String is infallible.
         let _ = writeln!(
             out,
-            "<tr><td>{}</td><td>{causality}</td><td>{variability}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            "<tr><td>{}</td><td>{causality}</td><td>{variability}</td><td>{:?}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
             escaped(&variable.name),
-            type_name(variable.kind),
+            variable.kind,
             escaped(variable.unit),
             variable.start.as_ref().map(|start| escaped(&start_text(start))).unwrap_or_default(),
             escaped(&variable.description),

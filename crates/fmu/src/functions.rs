@@ -4,8 +4,8 @@ use std::ffi::{c_char, c_int, c_uint};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr;
 
-use crate::border::{Fmi2Callbacks, Fmi2Status, call, reference_mut, send, text};
-use crate::instance::FmuInstance;
+use crate::border::{Fmi2Callbacks, Fmi2Status, reference_mut, send, text};
+use crate::instance::{FmuInstance, call, fmi_functions};
 use crate::slave::Phase;
 
 /// Returns "default".
@@ -75,187 +75,150 @@ pub unsafe extern "C" fn fmi2FreeInstance(c: *mut FmuInstance) {
     }
 }
 
-/// Accepts the call without effect, since only errors are logged.
-///
-/// # Safety
-/// `c` is null or an instance of this library.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetDebugLogging(
-    c: *mut FmuInstance,
-    _logging_on: c_int,
-    _category_count: usize,
-    _categories: *const *const c_char,
-) -> Fmi2Status {
-    // SAFETY: the caller promises an instance.
-    unsafe { call(c, |_| Ok(())) }
+/// Changes from one phase to the next, with the parameters applied.
+fn change(instance: &mut FmuInstance, from: Phase, to: Phase) -> Result<(), String> {
+    instance.slave.require(&[from])?;
+    instance.slave.apply()?;
+    instance.slave.phase = to;
+    Ok(())
 }
 
-/// Sets the start time, s.
-///
-/// # Safety
-/// `c` is null or an instance of this library.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetupExperiment(
-    c: *mut FmuInstance,
-    _tolerance_defined: c_int,
-    _tolerance: f64,
-    start_time: f64,
-    _stop_time_defined: c_int,
-    _stop_time: f64,
-) -> Fmi2Status {
-    let body = |instance: &mut FmuInstance| {
+/// Returns the error of a function that the model description excludes.
+fn unsupported(name: &str, reason: &str) -> Result<(), String> {
+    Err(format!("{name} is not supported: {reason}"))
+}
+
+fmi_functions! {
+    /// Accepts the call without effect, since only errors are logged.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library.
+    fn fmi2SetDebugLogging(
+        _instance: &mut FmuInstance,
+        _logging_on: c_int,
+        _category_count: usize,
+        _categories: *const *const c_char,
+    ) {
+        Ok(())
+    }
+
+    /// Sets the start time, s.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library.
+    fn fmi2SetupExperiment(
+        instance: &mut FmuInstance,
+        _tolerance_defined: c_int,
+        _tolerance: f64,
+        start_time: f64,
+        _stop_time_defined: c_int,
+        _stop_time: f64,
+    ) {
         instance.slave.require(&[Phase::Instantiated])?;
         if !start_time.is_finite() {
             return Err(format!("startTime is {start_time}; it must be finite"));
         }
         instance.slave.start_time = start_time;
         Ok(())
-    };
-    // SAFETY: the caller promises an instance.
-    unsafe { call(c, body) }
-}
+    }
 
-/// Changes from one phase to the next, with the parameters applied.
-///
-/// # Safety
-/// `c` is null or an instance of this library.
-unsafe fn change(c: *mut FmuInstance, from: Phase, to: Phase) -> Fmi2Status {
-    let body = |instance: &mut FmuInstance| {
-        instance.slave.require(&[from])?;
-        instance.slave.apply()?;
-        instance.slave.phase = to;
-        Ok(())
-    };
-    // SAFETY: the caller promises an instance.
-    unsafe { call(c, body) }
-}
+    /// Begins the initialization.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library.
+    fn fmi2EnterInitializationMode(instance: &mut FmuInstance) {
+        change(instance, Phase::Instantiated, Phase::Initialization)
+    }
 
-/// Begins the initialization.
-///
-/// # Safety
-/// `c` is null or an instance of this library.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2EnterInitializationMode(c: *mut FmuInstance) -> Fmi2Status {
-    // SAFETY: the caller promises an instance.
-    unsafe { change(c, Phase::Instantiated, Phase::Initialization) }
-}
+    /// Ends the initialization; the axes are at rest at their start positions.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library.
+    fn fmi2ExitInitializationMode(instance: &mut FmuInstance) {
+        change(instance, Phase::Initialization, Phase::Stepping)
+    }
 
-/// Ends the initialization; the axes are at rest at their start positions.
-///
-/// # Safety
-/// `c` is null or an instance of this library.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2ExitInitializationMode(c: *mut FmuInstance) -> Fmi2Status {
-    // SAFETY: the caller promises an instance.
-    unsafe { change(c, Phase::Initialization, Phase::Stepping) }
-}
+    /// Ends the simulation; values can still be read.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library.
+    fn fmi2Terminate(instance: &mut FmuInstance) {
+        change(instance, Phase::Stepping, Phase::Terminated)
+    }
 
-/// Ends the simulation; values can still be read.
-///
-/// # Safety
-/// `c` is null or an instance of this library.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Terminate(c: *mut FmuInstance) -> Fmi2Status {
-    // SAFETY: the caller promises an instance.
-    unsafe { change(c, Phase::Stepping, Phase::Terminated) }
-}
-
-/// Returns to the state after `fmi2Instantiate`.
-///
-/// # Safety
-/// `c` is null or an instance of this library.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Reset(c: *mut FmuInstance) -> Fmi2Status {
-    let body = |instance: &mut FmuInstance| {
+    /// Returns to the state after `fmi2Instantiate`.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library.
+    fn fmi2Reset(instance: &mut FmuInstance) {
         instance.reset();
         Ok(())
-    };
-    // SAFETY: the caller promises an instance.
-    unsafe { call(c, body) }
-}
+    }
 
-/// Advances from the end of the last step by a multiple of the current cycle, s.
-///
-/// # Safety
-/// `c` is null or an instance of this library.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2DoStep(
-    c: *mut FmuInstance,
-    current_communication_point: f64,
-    communication_step_size: f64,
-    _no_set_fmu_state_prior: c_int,
-) -> Fmi2Status {
-    // SAFETY: the caller promises an instance.
-    unsafe { call(c, |instance| instance.slave.step(current_communication_point, communication_step_size)) }
-}
+    /// Advances from the end of the last step by a multiple of the current cycle, s.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library.
+    fn fmi2DoStep(
+        instance: &mut FmuInstance,
+        current_communication_point: f64,
+        communication_step_size: f64,
+        _no_set_fmu_state_prior: c_int,
+    ) {
+        instance.slave.step(current_communication_point, communication_step_size)
+    }
 
-/// Rejects a function that the model description excludes.
-///
-/// # Safety
-/// `c` is null or an instance of this library.
-unsafe fn unsupported(c: *mut FmuInstance, name: &str, reason: &str) -> Fmi2Status {
-    // SAFETY: the caller promises an instance.
-    unsafe { call(c, |_| Err(format!("{name} is not supported: {reason}"))) }
-}
+    /// Rejects the call, which the FMU does not support.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library.
+    fn fmi2GetDirectionalDerivative(
+        _instance: &mut FmuInstance,
+        _unknowns: *const c_uint,
+        _unknown_count: usize,
+        _knowns: *const c_uint,
+        _known_count: usize,
+        _known_differences: *const f64,
+        _unknown_differences: *mut f64,
+    ) {
+        unsupported("fmi2GetDirectionalDerivative", "the FMU provides no directional derivatives")
+    }
 
-/// Rejects the call, which the FMU does not support.
-///
-/// # Safety
-/// `c` is null or an instance of this library.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
-    c: *mut FmuInstance,
-    _unknowns: *const c_uint,
-    _unknown_count: usize,
-    _knowns: *const c_uint,
-    _known_count: usize,
-    _known_differences: *const f64,
-    _unknown_differences: *mut f64,
-) -> Fmi2Status {
-    // SAFETY: the caller promises an instance.
-    unsafe { unsupported(c, "fmi2GetDirectionalDerivative", "the FMU provides no directional derivatives") }
-}
+    /// Rejects the call, which the FMU does not support.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library.
+    fn fmi2SetRealInputDerivatives(
+        _instance: &mut FmuInstance,
+        _references: *const c_uint,
+        _count: usize,
+        _orders: *const c_int,
+        _values: *const f64,
+    ) {
+        unsupported("fmi2SetRealInputDerivatives", "inputs are held as the drives hold them")
+    }
 
-/// Rejects the call, which the FMU does not support.
-///
-/// # Safety
-/// `c` is null or an instance of this library.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetRealInputDerivatives(
-    c: *mut FmuInstance,
-    _references: *const c_uint,
-    _count: usize,
-    _orders: *const c_int,
-    _values: *const f64,
-) -> Fmi2Status {
-    // SAFETY: the caller promises an instance.
-    unsafe { unsupported(c, "fmi2SetRealInputDerivatives", "inputs are held as the drives hold them") }
-}
+    /// Rejects the call, which the FMU does not support.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library.
+    fn fmi2GetRealOutputDerivatives(
+        _instance: &mut FmuInstance,
+        _references: *const c_uint,
+        _count: usize,
+        _orders: *const c_int,
+        _values: *mut f64,
+    ) {
+        unsupported("fmi2GetRealOutputDerivatives", "maxOutputDerivativeOrder is 0")
+    }
 
-/// Rejects the call, which the FMU does not support.
-///
-/// # Safety
-/// `c` is null or an instance of this library.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
-    c: *mut FmuInstance,
-    _references: *const c_uint,
-    _count: usize,
-    _orders: *const c_int,
-    _values: *mut f64,
-) -> Fmi2Status {
-    // SAFETY: the caller promises an instance.
-    unsafe { unsupported(c, "fmi2GetRealOutputDerivatives", "maxOutputDerivativeOrder is 0") }
-}
-
-/// Rejects the call, since steps are synchronous.
-///
-/// # Safety
-/// `c` is null or an instance of this library.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2CancelStep(c: *mut FmuInstance) -> Fmi2Status {
-    // SAFETY: the caller promises an instance.
-    unsafe { unsupported(c, "fmi2CancelStep", "steps are synchronous") }
+    /// Rejects the call, since steps are synchronous.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library.
+    fn fmi2CancelStep(_instance: &mut FmuInstance) {
+        unsupported("fmi2CancelStep", "steps are synchronous")
+    }
 }
 
 /// Returns `fmi2Discard`, since steps are synchronous.

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::ffi::CString;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use virtual_axes_core::config::Parameters;
 
-use crate::MACHINE_FILE;
 use crate::border::{Fmi2Callbacks, Fmi2Status, send};
 use crate::description::guid;
-use crate::resources::machine_file;
+use crate::resources::{MACHINE_FILE, machine_file};
 use crate::slave::{Phase, Slave};
 use crate::variables::{FmuVariable, FmuVariables};
 
@@ -77,6 +77,30 @@ impl FmuInstance {
     }
 }
 
+/// Runs `body` on an instance; logs its error or panic and returns the status.
+///
+/// # Safety
+/// `component` is null or a live instance of this library that no other thread uses.
+pub(crate) unsafe fn call(
+    component: *mut FmuInstance,
+    body: impl FnOnce(&mut FmuInstance) -> Result<(), String>,
+) -> Fmi2Status {
+    // SAFETY: the caller promises a live instance of its own.
+    let Some(instance) = (unsafe { component.as_mut() }) else { return Fmi2Status::Error };
+    match catch_unwind(AssertUnwindSafe(|| body(instance))) {
+        Ok(Ok(())) => Fmi2Status::Ok,
+        Ok(Err(reason)) => {
+            instance.log(Fmi2Status::Error, &reason);
+            Fmi2Status::Error
+        }
+        Err(_) => {
+            instance.slave.phase = Phase::Broken;
+            instance.log(Fmi2Status::Fatal, "error of the library: call fmi2Reset or fmi2SetFMUstate");
+            Fmi2Status::Fatal
+        }
+    }
+}
+
 /// Returns the variables of value references.
 pub(crate) fn find<'a>(
     variables: &'a FmuVariables,
@@ -89,3 +113,21 @@ pub(crate) fn find<'a>(
     };
     references.iter().map(find).collect()
 }
+
+/// Defines functions of FMI: arguments behind the instance, and what each one does with the instance.
+macro_rules! fmi_functions {
+    ($(
+        $(#[$meta:meta])*
+        fn $name:ident($instance:ident: &mut FmuInstance $(, $argument:ident: $type:ty)* $(,)?) $body:block
+    )*) => {$(
+        $(#[$meta])*
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name(c: *mut FmuInstance $(, $argument: $type)*) -> Fmi2Status {
+            let body = |$instance: &mut FmuInstance| $body;
+            // SAFETY: the caller promises an instance.
+            unsafe { call(c, body) }
+        }
+    )*};
+}
+
+pub(crate) use fmi_functions;

@@ -31,16 +31,12 @@ mod value_functions;
 mod variables;
 
 pub use border::{Fmi2Callbacks, Fmi2Logger, Fmi2Status};
-pub use description::{guid, model_description};
+pub use description::{MODEL_IDENTIFIER, guid, model_description};
 pub use documentation::documentation;
 pub use functions::*;
 pub use instance::FmuInstance;
+pub use resources::MACHINE_FILE;
 pub use signals::{FmuSignal, SIGNALS};
 pub use state_functions::*;
 pub use value_functions::*;
 pub use variables::{Causality, FmuType, FmuVariable, FmuVariables, VariableRole};
-
-/// Name of the library in the archive, without extension, and `modelIdentifier` of the model description.
-pub const MODEL_IDENTIFIER: &str = "virtual_axes_fmu";
-/// Path of the machine file below the resources of the archive.
-pub const MACHINE_FILE: &str = "machine.yaml";

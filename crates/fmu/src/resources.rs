@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::MACHINE_FILE;
-
+/// Path of the machine file below the resources of the archive.
+pub const MACHINE_FILE: &str = "machine.yaml";
 /// Largest machine file, bytes.
 const MAX_BYTES: u64 = 4 << 20;
 

@@ -1,5 +1,6 @@
 //! Outputs of an axis.
 
+use SignalQuantity::{Current, Force, MotorSpeed, MotorTorque, Position, Velocity, Voltage};
 use virtual_axes_core::machine::AxisSample;
 
 /// Quantity of a signal, which has a unit by type of axis or motor.
@@ -31,80 +32,42 @@ pub struct FmuSignal {
     pub(crate) reader: SignalReader,
 }
 
-const fn real(
-    name: &'static str,
-    quantity: SignalQuantity,
-    read: fn(&AxisSample) -> f64,
-    description: &'static str,
-) -> FmuSignal {
-    FmuSignal { name, description, reader: SignalReader::Real(quantity, read) }
+/// Defines the list of outputs: name, reader and description of each.
+macro_rules! signals {
+    ($($name:literal: $kind:ident($($reader:tt)*), $description:literal;)*) => {
+        /// Outputs of each axis, in the order of the variables.
+        pub const SIGNALS: &[FmuSignal] = &[$(FmuSignal {
+            name: $name,
+            description: $description,
+            reader: SignalReader::$kind($($reader)*),
+        }),*];
+    };
 }
 
-const fn boolean(name: &'static str, read: fn(&AxisSample) -> bool, description: &'static str) -> FmuSignal {
-    FmuSignal { name, description, reader: SignalReader::Boolean(read) }
+signals! {
+    "position": Real(Position, |s| s.position), "Simulated position.";
+    "velocity": Real(Velocity, |s| s.velocity), "Simulated velocity.";
+    "current": Real(Current, |s| s.current), "Simulated motor current.";
+    "following_error": Real(Position, AxisSample::following_error),
+        "Following error: setpoint − position; it contains the delay α.";
+    "delay_compensated_following_error": Real(Position, AxisSample::delay_compensated_following_error),
+        "Following error against the setpoint delayed by α.";
+    "effort": Real(Force, |s| s.effort), "Force or torque of the motor at the axis.";
+    "current_setpoint": Real(Current, |s| s.current_setpoint), "Setpoint of the current loop after its limit.";
+    "voltage": Real(Voltage, |s| s.voltage), "Motor voltage after its limit.";
+    "velocity_setpoint": Real(MotorSpeed, |s| s.velocity_setpoint),
+        "Ω*, output of the position controller after its limit, at the motor.";
+    "velocity_feedforward": Real(MotorSpeed, |s| s.velocity_feedforward),
+        "Velocity feedforward after its delay β, at the motor.";
+    "torque_feedforward": Real(MotorTorque, |s| s.torque_feedforward),
+        "Torque feedforward after its delay γ, and friction compensation, at the motor.";
+    "friction_current": Real(Current, |s| s.friction_current), "Friction as motor current.";
+    "gravity_current": Real(Current, |s| s.gravity_current), "Gravity as motor current.";
+    "load_current": Real(Current, |s| s.load_current),
+        "External load as motor current, positive against motion towards plus.";
+    "wind_up": Real(Position, |s| s.wind_up),
+        "Wind-up of an elastic transmission: position of the motor at the axis minus position of the load.";
+    "is_saturated": Boolean(|s| s.saturated), "True if speed, current or voltage setpoint is at its limit.";
+    "is_friction_extrapolated": Boolean(|s| s.friction_extrapolated),
+        "True if the friction law is extrapolated beyond its fitted range.";
 }
-
-/// Outputs of each axis, in the order of the variables.
-pub const SIGNALS: &[FmuSignal] = &[
-    real("position", SignalQuantity::Position, |s| s.position, "Simulated position."),
-    real("velocity", SignalQuantity::Velocity, |s| s.velocity, "Simulated velocity."),
-    real("current", SignalQuantity::Current, |s| s.current, "Simulated motor current."),
-    real(
-        "following_error",
-        SignalQuantity::Position,
-        AxisSample::following_error,
-        "Following error: setpoint − position; it contains the delay α.",
-    ),
-    real(
-        "delay_compensated_following_error",
-        SignalQuantity::Position,
-        AxisSample::delay_compensated_following_error,
-        "Following error against the setpoint delayed by α.",
-    ),
-    real("effort", SignalQuantity::Force, |s| s.effort, "Force or torque of the motor at the axis."),
-    real(
-        "current_setpoint",
-        SignalQuantity::Current,
-        |s| s.current_setpoint,
-        "Setpoint of the current loop after its limit.",
-    ),
-    real("voltage", SignalQuantity::Voltage, |s| s.voltage, "Motor voltage after its limit."),
-    real(
-        "velocity_setpoint",
-        SignalQuantity::MotorSpeed,
-        |s| s.velocity_setpoint,
-        "Ω*, output of the position controller after its limit, at the motor.",
-    ),
-    real(
-        "velocity_feedforward",
-        SignalQuantity::MotorSpeed,
-        |s| s.velocity_feedforward,
-        "Velocity feedforward after its delay β, at the motor.",
-    ),
-    real(
-        "torque_feedforward",
-        SignalQuantity::MotorTorque,
-        |s| s.torque_feedforward,
-        "Torque feedforward after its delay γ, and friction compensation, at the motor.",
-    ),
-    real("friction_current", SignalQuantity::Current, |s| s.friction_current, "Friction as motor current."),
-    real("gravity_current", SignalQuantity::Current, |s| s.gravity_current, "Gravity as motor current."),
-    real(
-        "load_current",
-        SignalQuantity::Current,
-        |s| s.load_current,
-        "External load as motor current, positive against motion towards plus.",
-    ),
-    real(
-        "wind_up",
-        SignalQuantity::Position,
-        |s| s.wind_up,
-        "Wind-up of an elastic transmission: position of the motor at the axis minus position of the load.",
-    ),
-    boolean("is_saturated", |s| s.saturated, "True if speed, current or voltage setpoint is at its limit."),
-    boolean(
-        "is_friction_extrapolated",
-        |s| s.friction_extrapolated,
-        "True if the friction law is extrapolated beyond its fitted range.",
-    ),
-];

@@ -13,43 +13,22 @@ const LONGEST_STEP_S: f64 = 1000.0;
 /// Largest deviation of a step from a multiple of the current cycle, ns: rounding of the importer's time.
 const STEP_TOLERANCE_NS: f64 = 1.0;
 
-/// Phase of a co-simulation in the order of FMI 2.0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Phase {
-    Instantiated,
-    Initialization,
-    Stepping,
-    Terminated,
-    /// After an error of this library, until a reset or a saved state.
-    Broken,
+virtual_axes_core::named_values! {
+    /// Phase of a co-simulation in the order of FMI 2.0.
+    pub(crate) enum Phase {
+        Instantiated = "instantiated",
+        Initialization = "initialization mode",
+        Stepping = "step complete",
+        Terminated = "terminated",
+        /// After an error of this library, until a reset or a saved state.
+        Broken = "error of the library",
+    }
 }
 
 impl Phase {
-    pub const ALL: [Phase; 5] =
-        [Phase::Instantiated, Phase::Initialization, Phase::Stepping, Phase::Terminated, Phase::Broken];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Phase::Instantiated => "instantiated",
-            Phase::Initialization => "initialization mode",
-            Phase::Stepping => "step complete",
-            Phase::Terminated => "terminated",
-            Phase::Broken => "error of the library",
-        }
-    }
-
     fn is_before_steps(self) -> bool {
         matches!(self, Phase::Instantiated | Phase::Initialization)
     }
-}
-
-/// Value to set.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum VariableSetting<'a> {
-    Real(f64),
-    Integer(i32),
-    Boolean(bool),
-    String(&'a str),
 }
 
 /// Machine with its inputs and the phase of the co-simulation.
@@ -154,12 +133,12 @@ impl Slave {
     }
 
     /// Returns an error unless `setting` is allowed for a variable now.
-    pub fn check(&self, variable: &FmuVariable, setting: VariableSetting<'_>) -> Result<(), String> {
+    pub fn check(&self, variable: &FmuVariable, setting: &Value) -> Result<(), String> {
         let kind = match setting {
-            VariableSetting::Real(_) => FmuType::Real,
-            VariableSetting::Integer(_) => FmuType::Integer,
-            VariableSetting::Boolean(_) => FmuType::Boolean,
-            VariableSetting::String(_) => FmuType::String,
+            Value::Double(_) => FmuType::Real,
+            Value::Integer(_) => FmuType::Integer,
+            Value::Bool(_) => FmuType::Boolean,
+            _ => FmuType::String,
         };
         let name = &variable.name;
         if variable.kind != kind {
@@ -176,7 +155,7 @@ impl Slave {
         }
         match setting {
             // The schema limits parameters.
-            VariableSetting::Real(value) if !matches!(variable.role, VariableRole::Parameter(_)) => {
+            &Value::Double(value) if !matches!(variable.role, VariableRole::Parameter(_)) => {
                 check_input(value).map_err(|error| format!("{name} is {error}"))
             }
             _ => Ok(()),
@@ -184,9 +163,9 @@ impl Slave {
     }
 
     /// Sets checked inputs and parameters; on error no parameter.
-    pub fn set(&mut self, settings: &[(&FmuVariable, VariableSetting<'_>)]) -> Result<(), String> {
+    pub fn set(&mut self, settings: &[(&FmuVariable, Value)]) -> Result<(), String> {
         let mut assignments = Vec::new();
-        for &(variable, setting) in settings {
+        for (variable, setting) in settings {
             if let VariableRole::Parameter(key) = &variable.role {
                 let value = parameter_value(key, variable, setting)?;
                 if self.parameters.get(key).as_ref() != Some(&value) {
@@ -203,15 +182,15 @@ impl Slave {
             self.is_changed = true;
         }
         let length = self.preview.len() / self.psec.len().max(1);
-        for &(variable, setting) in settings {
+        for (variable, setting) in settings {
             match (&variable.role, setting) {
-                (&VariableRole::Setpoint(axis), VariableSetting::Real(value)) => self.psec[axis] = value,
-                (&VariableRole::Load(axis), VariableSetting::Real(value)) => self.loads[axis] = value,
-                (&VariableRole::Preview { axis, cycle }, VariableSetting::Real(value)) => {
+                (&VariableRole::Setpoint(axis), &Value::Double(value)) => self.psec[axis] = value,
+                (&VariableRole::Load(axis), &Value::Double(value)) => self.loads[axis] = value,
+                (&VariableRole::Preview { axis, cycle }, &Value::Double(value)) => {
                     self.preview[axis * length + cycle] = value;
                 }
-                (VariableRole::UsesPreview, VariableSetting::Boolean(value)) => self.uses_preview = value,
-                (&VariableRole::StartPosition(axis), VariableSetting::Real(value)) => {
+                (VariableRole::UsesPreview, &Value::Bool(value)) => self.uses_preview = value,
+                (&VariableRole::StartPosition(axis), &Value::Double(value)) => {
                     self.start_positions[axis] = value;
                     self.is_changed = true;
                 }
@@ -297,17 +276,13 @@ fn wrong_type(variable: &FmuVariable, wanted: FmuType) -> String {
     format!("{} is of type {:?}; the call needs a variable of type {wanted:?}", variable.name, variable.kind)
 }
 
-fn parameter_value(key: &str, variable: &FmuVariable, setting: VariableSetting<'_>) -> Result<Value, String> {
-    Ok(match setting {
-        VariableSetting::Real(value) => Value::Double(value),
-        VariableSetting::Integer(value) => Value::Integer(i64::from(value)),
-        VariableSetting::Boolean(value) => Value::Bool(value),
-        VariableSetting::String(value) => match variable.start {
-            Some(Value::Text(_)) => Value::Text(value.to_owned()),
-            _ => {
-                let text = format!("{key}={value}");
-                parse_assignment(&text, &ValueSource::named("FMU")).map_err(|error| error.to_string())?.value
-            }
-        },
-    })
+fn parameter_value(key: &str, variable: &FmuVariable, setting: &Value) -> Result<Value, String> {
+    match (setting, &variable.start) {
+        (Value::Text(_), Some(Value::Text(_))) => Ok(setting.clone()),
+        (Value::Text(value), _) => {
+            let assignment = parse_assignment(&format!("{key}={value}"), &ValueSource::named("FMU"));
+            Ok(assignment.map_err(|error| error.to_string())?.value)
+        }
+        _ => Ok(setting.clone()),
+    }
 }

@@ -2,7 +2,7 @@
 
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::machine::{Machine, check_input};
-use virtual_axes_core::state_codec::checksum;
+use virtual_axes_core::state_codec::{SealedBytes, seal};
 
 use crate::slave::{Phase, Slave, discretized};
 
@@ -25,7 +25,7 @@ impl Slave {
         bytes.extend((yaml.len() as u64).to_le_bytes());
         bytes.extend(yaml.as_bytes());
         bytes.extend(slave.machine.state_bytes());
-        bytes.extend(checksum(&bytes).to_le_bytes());
+        seal(&mut bytes);
         Ok(bytes)
     }
 
@@ -36,11 +36,7 @@ impl Slave {
         if !bytes.starts_with(&HEAD) {
             return Err(format!("the {size} bytes are no state of this version of the FMU"));
         }
-        let (content, found) = bytes.split_last_chunk().ok_or_else(damaged)?;
-        if content.len() < HEAD.len() || checksum(content) != u64::from_le_bytes(*found) {
-            return Err(damaged());
-        }
-        let mut reader = Reader(&content[HEAD.len()..]);
+        let mut reader = SealedBytes::open(bytes, &HEAD).ok_or_else(damaged)?;
         let mut slave = model.clone();
         let flags = reader.bytes(2).ok_or_else(damaged)?;
         slave.phase = *Phase::ALL.get(usize::from(flags[0])).ok_or_else(damaged)?;
@@ -52,35 +48,13 @@ impl Slave {
                 *value = reader.number().filter(|&value| check_input(value).is_ok()).ok_or_else(damaged)?;
             }
         }
-        let length = u64::from_le_bytes(reader.array().ok_or_else(damaged)?);
-        let yaml =
-            usize::try_from(length).ok().and_then(|length| reader.bytes(length)).ok_or_else(damaged)?;
-        let yaml = std::str::from_utf8(yaml).map_err(|_| damaged())?;
+        let yaml = reader.counted(1).and_then(|text| std::str::from_utf8(text).ok()).ok_or_else(damaged)?;
         slave.parameters = Parameters::from_yaml(yaml, "state").map_err(|error| error.to_string())?;
         if slave.parameters.get("joints") != model.parameters.get("joints") {
             return Err("the state is that of a machine with other axes".to_owned());
         }
-        slave.machine = Machine::from_state_bytes(discretized(&slave.parameters)?, reader.0)
+        slave.machine = Machine::from_state_bytes(discretized(&slave.parameters)?, reader.rest())
             .map_err(|error| error.to_string())?;
         Ok(slave)
-    }
-}
-
-/// Rest of the bytes of a state.
-struct Reader<'a>(&'a [u8]);
-
-impl<'a> Reader<'a> {
-    fn bytes(&mut self, length: usize) -> Option<&'a [u8]> {
-        let (found, rest) = self.0.split_at_checked(length)?;
-        self.0 = rest;
-        Some(found)
-    }
-
-    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
-        self.bytes(N)?.try_into().ok()
-    }
-
-    fn number(&mut self) -> Option<f64> {
-        self.array().map(f64::from_le_bytes).filter(|value| value.is_finite())
     }
 }

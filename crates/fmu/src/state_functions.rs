@@ -5,30 +5,9 @@
 use std::ffi::c_void;
 use std::ptr;
 
-use crate::border::{Fmi2Status, call, reference_mut, values, values_mut};
-use crate::instance::FmuInstance;
+use crate::border::{Fmi2Status, reference_mut, values, values_mut};
+use crate::instance::{FmuInstance, call, fmi_functions};
 use crate::slave::Slave;
-
-/// Saves the state; a state in `*state` is replaced.
-///
-/// # Safety
-/// `c` is null or an instance of this library, `state` null or a pointer to a state.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetFMUstate(c: *mut FmuInstance, state: *mut *mut c_void) -> Fmi2Status {
-    let body = |instance: &mut FmuInstance| {
-        // SAFETY: the caller promises a pointer.
-        let state = unsafe { reference_mut(state, "FMUstate") }?;
-        instance.require_usable()?;
-        if !state.is_null() {
-            saved(instance, *state)?;
-        }
-        let saved = instance.slave.clone();
-        keep(instance, state, saved);
-        Ok(())
-    };
-    // SAFETY: the caller promises an instance.
-    unsafe { call(c, body) }
-}
 
 /// Keeps a state under the number in `*state`, or under a new one.
 fn keep(instance: &mut FmuInstance, state: &mut *mut c_void, saved: Slave) {
@@ -47,27 +26,37 @@ fn saved(instance: &FmuInstance, state: *mut c_void) -> Result<&Slave, String> {
         .ok_or_else(|| "FMUstate is no state of this instance; fmi2GetFMUstate saves one".to_owned())
 }
 
-/// Returns to a saved state, which can be used again.
-///
-/// # Safety
-/// `c` is null or an instance of this library.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetFMUstate(c: *mut FmuInstance, state: *mut c_void) -> Fmi2Status {
-    let body = |instance: &mut FmuInstance| {
+fmi_functions! {
+    /// Saves the state; a state in `*state` is replaced.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library, `state` null or a pointer to a state.
+    fn fmi2GetFMUstate(instance: &mut FmuInstance, state: *mut *mut c_void) {
+        // SAFETY: the caller promises a pointer.
+        let state = unsafe { reference_mut(state, "FMUstate") }?;
+        instance.require_usable()?;
+        if !state.is_null() {
+            saved(instance, *state)?;
+        }
+        let saved = instance.slave.clone();
+        keep(instance, state, saved);
+        Ok(())
+    }
+
+    /// Returns to a saved state, which can be used again.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library.
+    fn fmi2SetFMUstate(instance: &mut FmuInstance, state: *mut c_void) {
         instance.slave = saved(instance, state)?.clone();
         Ok(())
-    };
-    // SAFETY: the caller promises an instance.
-    unsafe { call(c, body) }
-}
+    }
 
-/// Destroys a saved state; null is allowed.
-///
-/// # Safety
-/// `c` is null or an instance of this library, `state` null or a pointer to a state.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2FreeFMUstate(c: *mut FmuInstance, state: *mut *mut c_void) -> Fmi2Status {
-    let body = |instance: &mut FmuInstance| {
+    /// Destroys a saved state; null is allowed.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library, `state` null or a pointer to a state.
+    fn fmi2FreeFMUstate(instance: &mut FmuInstance, state: *mut *mut c_void) {
         // SAFETY: the caller promises null or a pointer.
         let Some(state) = (unsafe { state.as_mut() }) else { return Ok(()) };
         if !state.is_null() {
@@ -76,42 +65,23 @@ pub unsafe extern "C" fn fmi2FreeFMUstate(c: *mut FmuInstance, state: *mut *mut 
             *state = ptr::null_mut();
         }
         Ok(())
-    };
-    // SAFETY: the caller promises an instance.
-    unsafe { call(c, body) }
-}
+    }
 
-/// Writes the number of bytes of a state.
-///
-/// # Safety
-/// `c` is null or an instance of this library, `size` null or a pointer to a number.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializedFMUstateSize(
-    c: *mut FmuInstance,
-    state: *mut c_void,
-    size: *mut usize,
-) -> Fmi2Status {
-    let body = |instance: &mut FmuInstance| {
+    /// Writes the number of bytes of a state.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library, `size` null or a pointer to a number.
+    fn fmi2SerializedFMUstateSize(instance: &mut FmuInstance, state: *mut c_void, size: *mut usize) {
         // SAFETY: the caller promises a pointer.
         *unsafe { reference_mut(size, "size") }? = saved(instance, state)?.to_bytes()?.len();
         Ok(())
-    };
-    // SAFETY: the caller promises an instance.
-    unsafe { call(c, body) }
-}
+    }
 
-/// Writes a state as bytes, for a file or another process.
-///
-/// # Safety
-/// `c` is null or an instance of this library, `bytes` null or space for `size` bytes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializeFMUstate(
-    c: *mut FmuInstance,
-    state: *mut c_void,
-    bytes: *mut u8,
-    size: usize,
-) -> Fmi2Status {
-    let body = |instance: &mut FmuInstance| {
+    /// Writes a state as bytes, for a file or another process.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library, `bytes` null or space for `size` bytes.
+    fn fmi2SerializeFMUstate(instance: &mut FmuInstance, state: *mut c_void, bytes: *mut u8, size: usize) {
         let written = saved(instance, state)?.to_bytes()?;
         if size != written.len() {
             let wanted = written.len();
@@ -120,24 +90,19 @@ pub unsafe extern "C" fn fmi2SerializeFMUstate(
         // SAFETY: the caller promises space for this number of bytes.
         unsafe { values_mut(bytes, size, "serializedState") }?.copy_from_slice(&written);
         Ok(())
-    };
-    // SAFETY: the caller promises an instance.
-    unsafe { call(c, body) }
-}
+    }
 
-/// Reads a state that any instance of the same FMU has written.
-///
-/// # Safety
-/// `c` is null or an instance of this library, `bytes` null or a pointer to `size` bytes, `state` null or a pointer to a
-/// state.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2DeSerializeFMUstate(
-    c: *mut FmuInstance,
-    bytes: *const u8,
-    size: usize,
-    state: *mut *mut c_void,
-) -> Fmi2Status {
-    let body = |instance: &mut FmuInstance| {
+    /// Reads a state that any instance of the same FMU has written.
+    ///
+    /// # Safety
+    /// `c` is null or an instance of this library, `bytes` null or a pointer to `size` bytes, `state` null or a pointer to a
+    /// state.
+    fn fmi2DeSerializeFMUstate(
+        instance: &mut FmuInstance,
+        bytes: *const u8,
+        size: usize,
+        state: *mut *mut c_void,
+    ) {
         // SAFETY: the caller promises a pointer, and this number of bytes.
         let (state, bytes) =
             unsafe { (reference_mut(state, "FMUstate")?, values(bytes, size, "serializedState")?) };
@@ -147,7 +112,5 @@ pub unsafe extern "C" fn fmi2DeSerializeFMUstate(
         let read = Slave::from_bytes(&instance.slave, bytes)?;
         keep(instance, state, read);
         Ok(())
-    };
-    // SAFETY: the caller promises an instance.
-    unsafe { call(c, body) }
+    }
 }

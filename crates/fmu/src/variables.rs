@@ -14,7 +14,7 @@ const START_POSITION: &str = "Position at the start, at rest.";
 const USES_PREVIEW: &str = "True if predictive controllers read the inputs preview; otherwise they take the present \
                             setpoint for the future ones.";
 
-/// Type of a variable in FMI 2.0.
+/// Type of a variable in FMI 2.0, by its name there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FmuType {
     /// `fmi2Real`.
@@ -117,37 +117,25 @@ impl FmuVariables {
             list.push(axis.input(
                 VariableRole::Setpoint(index),
                 "setpoint",
-                axis.unit(SignalQuantity::Position),
-                SETPOINT.to_owned(),
+                SignalQuantity::Position,
+                SETPOINT,
             ));
-            list.push(axis.input(
-                VariableRole::Load(index),
-                "load",
-                axis.unit(SignalQuantity::Force),
-                LOAD.to_owned(),
-            ));
+            list.push(axis.input(VariableRole::Load(index), "load", SignalQuantity::Force, LOAD));
             for cycle in 0..preview_length {
-                list.push(axis.input(
-                    VariableRole::Preview { axis: index, cycle },
-                    &format!("preview[{}]", cycle + 1),
-                    axis.unit(SignalQuantity::Position),
-                    format!("Position setpoint {} position cycles after the next one; {PREVIEW}", cycle + 1),
-                ));
+                let (role, name) =
+                    (VariableRole::Preview { axis: index, cycle }, format!("preview[{}]", cycle + 1));
+                let description =
+                    format!("Position setpoint {} position cycles after the next one; {PREVIEW}", cycle + 1);
+                list.push(axis.input(role, &name, SignalQuantity::Position, &description));
             }
         }
         for (index, axis) in axes.iter().enumerate() {
             list.extend(SIGNALS.iter().map(|signal| axis.output(index, signal)));
         }
         for (index, axis) in axes.iter().enumerate() {
-            list.push(FmuVariable {
-                causality: Causality::FixedParameter,
-                ..axis.input(
-                    VariableRole::StartPosition(index),
-                    "start_position",
-                    axis.unit(SignalQuantity::Position),
-                    START_POSITION.to_owned(),
-                )
-            });
+            let (role, quantity) = (VariableRole::StartPosition(index), SignalQuantity::Position);
+            let input = axis.input(role, "start_position", quantity, START_POSITION);
+            list.push(FmuVariable { causality: Causality::FixedParameter, ..input });
         }
         if preview_length > 0 {
             list.push(FmuVariable {
@@ -204,14 +192,20 @@ impl AxisUnits {
         }
     }
 
-    fn input(&self, role: VariableRole, name: &str, unit: &'static str, description: String) -> FmuVariable {
+    fn input(
+        &self,
+        role: VariableRole,
+        name: &str,
+        quantity: SignalQuantity,
+        description: &str,
+    ) -> FmuVariable {
         FmuVariable {
             name: format!("{}.{name}", self.name),
             role,
             kind: FmuType::Real,
             causality: Causality::Input,
-            unit,
-            description,
+            unit: self.unit(quantity),
+            description: description.to_owned(),
             range: None,
             start: Some(Value::Double(0.0)),
         }

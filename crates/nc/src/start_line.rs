@@ -146,7 +146,7 @@ mod tests {
             let mut planner = PartProgramPlanner::new(steps, &machine, PlanOptions::default()).unwrap();
             let mut found = Vec::new();
             while let Some(setpoint) = planner.next_setpoint(1.0).unwrap() {
-                found.push((setpoint.line, setpoint.psec().to_vec()));
+                found.push((setpoint.place.line, setpoint.psec().to_vec()));
             }
             found
         };

@@ -65,7 +65,7 @@ impl ContourTrackers {
                 .map(|joints| self.kinematics.forward(joints));
             let Some(start) = poses.next() else { continue };
             *tracker = SetpointTracker::new(start);
-            poses.for_each(|pose| tracker.push(pose));
+            poses.for_each(|pose| tracker.push(pose, false));
         }
         Ok(())
     }
@@ -74,7 +74,7 @@ impl ContourTrackers {
     fn push(&mut self, psec: PyReadonlyArray2<'_, f64>) -> PyResult<()> {
         let psec = self.rows("psec", &psec)?;
         for (tracker, joints) in self.trackers.iter_mut().zip(psec.chunks(self.axes)) {
-            tracker.push(self.kinematics.forward(joints));
+            tracker.push(self.kinematics.forward(joints), false);
         }
         Ok(())
     }

@@ -171,11 +171,7 @@ impl PyRst {
 }
 
 fn axis_of<'m>(machine: &'m PyMachine, name: &str) -> PyResult<&'m AxisConfig> {
-    let axes = machine.config.axes();
-    axes.iter().find(|known| known.name() == name).ok_or_else(|| {
-        let names: Vec<&str> = axes.iter().map(|axis| axis.name()).collect();
-        value_error(format!("axis {name:?} is unknown; known are {}", names.join(", ")))
-    })
+    Ok(&machine.config.axes()[machine.axis_index(name)?])
 }
 
 /// Computes the prediction model of an axis.

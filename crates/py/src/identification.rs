@@ -10,11 +10,11 @@ use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::identify::{
     AxisIdentification, AxisRecordings, Breakaway, ConditionedRecording, FeedforwardMode,
-    IdentificationInput, IdentificationOptions, RefinementScope,
+    IdentificationOptions, RefinementScope,
 };
-use virtual_axes_identify::recording::{Conditioning, Finding, PsecShift, RawRecording};
+use virtual_axes_identify::recording::{Conditioning, Finding, PsecShift, RawRecording, StatedValues};
 use virtual_axes_io::files::{Columns, RecordingOptions, read_recording};
-use virtual_axes_report::{IdentificationPage, ValidationRecording};
+use virtual_axes_report::IdentificationPage;
 
 use crate::convert::{check_stopped, interruptible, value_error};
 use crate::machine::PyMachine;
@@ -33,7 +33,7 @@ pub enum GivenRecording<'py> {
 /// Recording to read or to condition.
 enum Source {
     File(PathBuf),
-    Raw(RawRecording),
+    Raw(Box<RawRecording>),
 }
 
 /// Shift of the setpoints in time.
@@ -81,18 +81,19 @@ impl GivenRecording<'_> {
                 "position" => raw.position = Some(values),
                 "velocity" => raw.velocity = Some(values),
                 "current" => raw.current = Some(values),
+                "torque" => raw.torque = Some(values),
                 "velocity_feedforward" => raw.velocity_feedforward = Some(values),
                 "torque_feedforward" => raw.torque_feedforward = Some(values),
                 "motor_position" => raw.motor_position = Some(values),
                 other => {
                     return Err(value_error(format!(
-                        "channel {other:?} is unknown; known are time, psec, position, velocity, current, \
+                        "channel {other:?} is unknown; known are time, psec, position, velocity, current, torque, \
                          velocity_feedforward, torque_feedforward, motor_position"
                     )));
                 }
             }
         }
-        Ok(Source::Raw(raw))
+        Ok(Source::Raw(Box::new(raw)))
     }
 }
 
@@ -118,7 +119,7 @@ fn modes(given: &[String], count: usize, option: &str) -> PyResult<Vec<Option<Fe
 /// Returns the parameters that the refinement adjusts; all without a choice.
 fn scope(groups: Option<&Vec<String>>) -> PyResult<RefinementScope> {
     let Some(groups) = groups else { return Ok(RefinementScope::ALL) };
-    let mut scope = RefinementScope::NONE;
+    let mut scope = RefinementScope { position_cycle: !groups.is_empty(), ..RefinementScope::NONE };
     for group in groups {
         match group.as_str() {
             "inertia" => scope.inertia = true,
@@ -170,6 +171,7 @@ impl IdentifyOptions {
                 .map(|milliseconds| milliseconds * MILLISECOND),
             psec_shift,
             trace_filter: self.trace_filter_hz,
+            stated: StatedValues::ALL,
         })
     }
 }
@@ -182,7 +184,7 @@ fn raw(
 ) -> PyResult<(RawRecording, Vec<Finding>)> {
     match source {
         Source::File(path) => read_recording(path, axis, reading).map_err(value_error),
-        Source::Raw(raw) => Ok((raw.clone(), Vec::new())),
+        Source::Raw(raw) => Ok((raw.as_ref().clone(), Vec::new())),
     }
 }
 
@@ -191,12 +193,12 @@ fn conditioned(
     sources: &[Source],
     (axis, periods): (&AxisConfig, &Periods),
     (reading, conditioning): (&RecordingOptions, &Conditioning),
-    (modes, option): (&[Option<FeedforwardMode>], &str),
+    modes: &[Option<FeedforwardMode>],
 ) -> PyResult<Vec<ConditionedRecording>> {
     let mut found = Vec::new();
     for (source, mode) in sources.iter().zip(modes) {
         let (raw, findings) = raw(source, axis, reading)?;
-        let one = ConditionedRecording::new((&raw, findings), (axis, periods), conditioning, (*mode, option));
+        let one = ConditionedRecording::new((&raw, findings), (axis, periods), conditioning, *mode);
         found.push(one.map_err(value_error)?);
     }
     Ok(found)
@@ -239,13 +241,14 @@ pub fn identify(
     let reading = (&options.reading()?, &options.conditioning()?);
     let i0 = if options.free_i0 { Breakaway::Freed } else { Breakaway::Held };
     let refine = scope(options.refine.as_ref())?;
-    let chosen = IdentificationOptions { i0, refine, presliding: options.presliding };
+    let chosen =
+        IdentificationOptions { i0, refine, presliding: options.presliding, stated: StatedValues::ALL };
     let periods = machine.config.periods();
     let axis = (&machine.config.axes()[index], &periods);
     let stopped = AtomicBool::new(false);
     let found = interruptible(py, &stopped, || {
-        let recordings = conditioned(&files, axis, reading, (&of_files, "feedforward"))?;
-        let others = conditioned(&others, axis, reading, (&of_others, "validate_feedforward"))?;
+        let recordings = conditioned(&files, axis, reading, &of_files)?;
+        let others = conditioned(&others, axis, reading, &of_others)?;
         let start = |_: &str| check_stopped(&stopped);
         let transmission = both.iter().map(|source| {
             ConditionedRecording::of_both_encoders(raw(source, axis.0, reading.0)?, axis, reading.1)
@@ -278,27 +281,7 @@ impl PyIdentification {
     /// Returns the page of `virtual_axes identify --report`.
     fn report(&self, py: Python<'_>) -> PyResult<String> {
         py.detach(|| {
-            let found = &self.found;
-            let inputs: Vec<IdentificationInput<'_>> =
-                found.recordings.iter().map(ConditionedRecording::input).collect();
-            let findings: Vec<Vec<Finding>> = found.recordings.iter().map(|r| r.findings.clone()).collect();
-            let validations: Vec<ValidationRecording<'_>> = found
-                .validations
-                .iter()
-                .map(|one| ValidationRecording {
-                    input: one.recorded.input(),
-                    findings: &one.recorded.findings,
-                    agreement: &one.agreement,
-                })
-                .collect();
-            let page = IdentificationPage {
-                summary: &found.summary,
-                periods: self.periods,
-                inputs: &inputs,
-                findings: &findings,
-                identification: &found.identification,
-                validations: &validations,
-            };
+            let page = IdentificationPage { found: &self.found, periods: self.periods };
             let mut text = Vec::new();
             page.document().write(&mut text).map_err(value_error)?;
             String::from_utf8(text).map_err(value_error)

@@ -11,6 +11,7 @@ mod convert;
 mod design;
 mod identification;
 mod machine;
+mod machine_methods;
 mod setpoints;
 mod signals;
 mod simulate;

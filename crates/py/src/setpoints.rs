@@ -7,14 +7,14 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
+use virtual_axes_builtin::{PROGRAMS, SCENARIOS};
 use virtual_axes_core::path::Program;
 use virtual_axes_core::scenario::Scenario as CoreScenario;
 use virtual_axes_core::simulation::joint_limits;
-use virtual_axes_core::trial::{GridSource, ProgramSource};
-use virtual_axes_nc::builtin::BuiltinProgram;
-use virtual_axes_nc::offline::{
-    OverrideSchedule, PartProgramOptions, PartProgramSource, ProgramTrack, parse_m_code,
-};
+use virtual_axes_core::text::{builtin_names, builtin_text};
+use virtual_axes_core::trial::{GridRows, GridSource, ProgramSource};
+use virtual_axes_nc::interpret::IgnoredCodes;
+use virtual_axes_nc::offline::{OverrideSchedule, PartProgramOptions, PartProgramSource, ProgramTrack};
 use virtual_axes_nc::plan::PlanOptions;
 
 use crate::convert::{check_signals, value_error};
@@ -37,20 +37,27 @@ pub struct Rows {
     /// Machine indices of the joints.
     pub joints: Vec<usize>,
     pub values: Vec<f64>,
+    /// True for each row that is reached at rapid traverse.
+    pub rapid: Vec<bool>,
 }
 
 impl Rows {
     fn read(mut source: impl GridSource) -> PyResult<Self> {
         let joints = source.joints().to_vec();
-        let (mut row, mut values, mut count) = (vec![0.0; joints.len()], Vec::new(), 0_usize);
+        let (mut row, mut values, mut rapid) = (vec![0.0; joints.len()], Vec::new(), Vec::new());
         while source.next(&mut row).map_err(value_error)? {
             values.extend_from_slice(&row);
-            count += 1;
-            if count.is_multiple_of(ROWS_PER_CHECK) {
+            rapid.push(source.is_rapid());
+            if rapid.len().is_multiple_of(ROWS_PER_CHECK) {
                 check_signals()?;
             }
         }
-        Ok(Rows { joints, values })
+        Ok(Rows { joints, values, rapid })
+    }
+
+    /// Returns the setpoints as a source.
+    pub fn source(&self) -> GridRows<'_> {
+        GridRows::new(&self.joints, &self.values).with_rapid(&self.rapid)
     }
 
     fn into_array<'py>(self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
@@ -71,13 +78,13 @@ pub struct PyScenario {
 /// Returns the names of the built-in scenarios.
 #[pyfunction]
 pub fn scenario_names() -> Vec<&'static str> {
-    CoreScenario::builtin_names().collect()
+    builtin_names(SCENARIOS).collect()
 }
 
 /// Returns the names of the built-in part programs.
 #[pyfunction]
 pub fn nc_program_names() -> Vec<&'static str> {
-    BuiltinProgram::names().collect()
+    builtin_names(PROGRAMS).collect()
 }
 
 impl PyScenario {
@@ -97,10 +104,10 @@ impl PyScenario {
     #[staticmethod]
     #[pyo3(signature = (name_or_path, feed = None))]
     fn load(name_or_path: &str, feed: Option<f64>) -> PyResult<Self> {
-        if BuiltinProgram::find(name_or_path).is_some() {
+        if builtin_text(PROGRAMS, name_or_path).is_some() {
             return Err(value_error(format!("{name_or_path}: is a part program; load it with nc_program")));
         }
-        Ok(PyScenario { scenario: CoreScenario::load(name_or_path).map_err(value_error)?, feed })
+        Ok(PyScenario { scenario: CoreScenario::load(name_or_path, SCENARIOS).map_err(value_error)?, feed })
     }
 
     #[getter]
@@ -142,7 +149,7 @@ struct ProgramArguments {
     /// Feed override, 1 for 100 %.
     #[pyo3(item)]
     feed_override: f64,
-    /// M codes without effect.
+    /// G and M codes without effect.
     #[pyo3(item)]
     ignore: Vec<String>,
     /// Bound of the chord error, m.
@@ -167,17 +174,18 @@ impl ProgramArguments {
             }
         }
         let codes =
-            ignore.iter().map(|code| parse_m_code(code).map_err(|error| format!("ignore {code:?}: {error}")));
+            ignore.iter().map(|code| code.parse().map_err(|error| format!("ignore {code:?}: {error}")));
         let default = PlanOptions::default();
         Ok(PartProgramOptions {
             schedule: OverrideSchedule::constant(*feed_override),
-            ignored_m_codes: codes.collect::<Result<_, _>>()?,
+            ignored: IgnoredCodes::new(codes.collect::<Result<_, _>>()?),
             plan: PlanOptions {
                 chord_error: chord_error.unwrap_or(default.chord_error),
                 centripetal_acceleration: centripetal_acceleration
                     .unwrap_or(default.centripetal_acceleration),
                 ..default
             },
+            ..PartProgramOptions::default()
         })
     }
 }
@@ -186,7 +194,7 @@ impl PartProgram {
     /// Returns the setpoints with their lines.
     pub fn rows(&self, machine: &PyMachine) -> PyResult<(Rows, ProgramTrack)> {
         let track = RefCell::default();
-        let source = PartProgramSource::open(&self.path, &machine.config, &self.options, &track);
+        let source = PartProgramSource::open(&self.path, PROGRAMS, &machine.config, &self.options, &track);
         let rows = Rows::read(source.map_err(value_error)?)?;
         Ok((rows, track.into_inner()))
     }

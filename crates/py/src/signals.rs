@@ -6,44 +6,27 @@ use pyo3::types::PyDict;
 use virtual_axes_core::machine::{AxisSample, Machine};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
-/// Signals of an axis, in the order of the columns of [`SignalTable`].
-pub const NAMES: [&str; 15] = [
-    "psec",
-    "delayed_psec",
-    "position",
-    "velocity",
-    "current",
-    "current_setpoint",
-    "voltage",
-    "velocity_setpoint",
-    "velocity_feedforward",
-    "torque_feedforward",
-    "friction_current",
-    "gravity_current",
-    "load_current",
-    "effort",
-    "wind_up",
-];
+/// Name and value of a signal.
+type Signal = (&'static str, fn(&AxisSample) -> f64);
 
-fn values(sample: &AxisSample) -> [f64; NAMES.len()] {
-    [
-        sample.psec,
-        sample.delayed_psec,
-        sample.position,
-        sample.velocity,
-        sample.current,
-        sample.current_setpoint,
-        sample.voltage,
-        sample.velocity_setpoint,
-        sample.velocity_feedforward,
-        sample.torque_feedforward,
-        sample.friction_current,
-        sample.gravity_current,
-        sample.load_current,
-        sample.effort,
-        sample.wind_up,
-    ]
-}
+/// Signals of an axis.
+pub const SIGNALS: [Signal; 15] = [
+    ("psec", |s| s.psec),
+    ("delayed_psec", |s| s.delayed_psec),
+    ("position", |s| s.position),
+    ("velocity", |s| s.velocity),
+    ("current", |s| s.current),
+    ("current_setpoint", |s| s.current_setpoint),
+    ("voltage", |s| s.voltage),
+    ("velocity_setpoint", |s| s.velocity_setpoint),
+    ("velocity_feedforward", |s| s.velocity_feedforward),
+    ("torque_feedforward", |s| s.torque_feedforward),
+    ("friction_current", |s| s.friction_current),
+    ("gravity_current", |s| s.gravity_current),
+    ("load_current", |s| s.load_current),
+    ("effort", |s| s.effort),
+    ("wind_up", |s| s.wind_up),
+];
 
 /// Samples of all axes over time.
 #[derive(Debug, Default)]
@@ -56,7 +39,8 @@ pub struct SignalTable {
 impl SignalTable {
     /// Creates a table of the signals with these names; `Err` has an unknown one.
     pub fn new(names: &[String]) -> Result<Self, String> {
-        let index = |name: &String| NAMES.iter().position(|known| known == name).ok_or_else(|| name.clone());
+        let index =
+            |name: &String| SIGNALS.iter().position(|(known, _)| known == name).ok_or_else(|| name.clone());
         let columns =
             names.iter().map(|name| Ok((index(name)?, Vec::new()))).collect::<Result<_, String>>()?;
         Ok(SignalTable { time: Vec::new(), columns })
@@ -66,8 +50,8 @@ impl SignalTable {
     pub fn push(&mut self, time: Nanoseconds, machine: &Machine) {
         self.time.push(seconds(time));
         for axis in machine.axes() {
-            let values = values(axis.sample());
-            self.columns.iter_mut().for_each(|(index, column)| column.push(values[*index]));
+            let sample = axis.sample();
+            self.columns.iter_mut().for_each(|(index, column)| column.push(SIGNALS[*index].1(sample)));
         }
     }
 
@@ -77,7 +61,7 @@ impl SignalTable {
         found.set_item("time", PyArray1::from_vec(py, self.time))?;
         for (index, column) in self.columns {
             let array: Bound<'py, PyArray2<f64>> = PyArray1::from_vec(py, column).reshape([rows, axes])?;
-            found.set_item(NAMES[index], array)?;
+            found.set_item(SIGNALS[index].0, array)?;
         }
         Ok(found)
     }

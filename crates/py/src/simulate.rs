@@ -8,20 +8,19 @@ use numpy::PyReadonlyArray2;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use virtual_axes_builtin::PROGRAMS;
+use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::path::Program;
-use virtual_axes_core::trial::{
-    self, GridRows, Measures, SetpointSource, Tick, Trial, TrialError, TrialOutcome,
-};
+use virtual_axes_core::trial::{self, Measures, SetpointSource, Tick, Trial, TrialError, TrialOutcome};
 use virtual_axes_io::files::{figures_json, part_program_json, trace_writer};
-use virtual_axes_nc::offline::{LineErrors, ProgramFigures, ProgramTrack};
-use virtual_axes_report::runs::{
-    FeedAlongPath, ProgramReport, SimulatedRun, SimulationPage, controller_name,
-};
+use virtual_axes_nc::offline::{LineErrors, ProgramFigures, ProgramTrack, line_texts};
+use virtual_axes_report::ToolPath;
+use virtual_axes_report::runs::{ProgramReport, SimulatedRun, SimulationPage, controller_name};
 
 use crate::convert::{check_signals, value_error};
 use crate::machine::PyMachine;
 use crate::setpoints::{PartProgram, PyScenario, Rows};
-use crate::signals::SignalTable;
+use crate::signals::{SIGNALS, SignalTable};
 
 /// Position cycles between two looks at signals.
 const CYCLES_PER_CHECK: u64 = 5_000;
@@ -72,7 +71,7 @@ impl Given<'_> {
                     return Err(PyValueError::new_err("psec has no setpoints; it needs at least one row"));
                 }
                 let values = array.as_array().iter().copied().collect();
-                let rows = Rows { joints: (0..axes).collect(), values };
+                let rows = Rows { joints: (0..axes).collect(), values, rapid: Vec::new() };
                 Ok(Prepared { rows, program: None, part: None })
             }
             Given::Scenario(scenario) => {
@@ -125,10 +124,17 @@ impl SignalCheck {
 }
 
 impl Prepared {
-    fn trial<'m>(&self, machine: &'m PyMachine, measures: Measures, record: bool) -> Trial<'m> {
+    /// Returns the trial of a variant `config` of a machine.
+    pub fn trial<'m>(
+        &self,
+        machine: &PyMachine,
+        config: &'m MachineConfig,
+        measures: Measures,
+        record: bool,
+    ) -> Trial<'m> {
         let node = machine.parameters.node_config();
         Trial {
-            machine: &machine.config,
+            machine: config,
             program: self.program.clone(),
             allow_nonzero_end_velocity: node.allow_nonzero_velocity_at_trajectory_end,
             record,
@@ -136,8 +142,8 @@ impl Prepared {
         }
     }
 
-    fn source(&self) -> SetpointSource<'_> {
-        SetpointSource::Grid(Box::new(GridRows::new(&self.rows.joints, &self.rows.values)))
+    pub fn source(&self) -> SetpointSource<'_> {
+        SetpointSource::Grid(Box::new(self.rows.source()))
     }
 }
 
@@ -151,7 +157,7 @@ fn run(
 ) -> PyResult<(TrialOutcome, Option<ProgramFigures>)> {
     let part = prepared.part.take().filter(|_| measures.contour);
     let mut part = part.map(|(track, name)| (LineErrors::new(&machine.config), track, name));
-    let (trial, source) = (prepared.trial(machine, measures, false), prepared.source());
+    let (trial, source) = (prepared.trial(machine, &machine.config, measures, false), prepared.source());
     let mut signals = SignalCheck::new();
     let callback = |tick: Tick<'_>| {
         table.push(tick.time, tick.machine);
@@ -166,7 +172,7 @@ fn run(
         trial::run(&trial, source, callback)
     };
     let outcome = outcome.map_err(|error| signals.error(error))?;
-    let part = part.map(|(lines, track, name)| lines.finish(&name, &track, |_| {}));
+    let part = part.map(|(lines, track, name)| lines.finish(&name, PROGRAMS, &track, |_| {}));
     Ok((outcome, part.transpose()?))
 }
 
@@ -181,7 +187,7 @@ pub fn simulate<'py>(
 ) -> PyResult<(Bound<'py, PyDict>, String, usize)> {
     let measures = measures(figures)?;
     let mut table = SignalTable::new(signals).map_err(|name| {
-        let known = crate::signals::NAMES.join(", ");
+        let known = SIGNALS.map(|(name, _)| name).join(", ");
         value_error(format!("signal {name:?} is unknown; known are {known}"))
     })?;
     let mut prepared = psec.prepare(py, machine)?;
@@ -208,7 +214,7 @@ pub fn write_trace(py: Python<'_>, machine: &PyMachine, psec: &Given<'_>, path: 
             samples.extend(tick.machine.axes().iter().map(|axis| *axis.sample()));
             writer.row(tick.time, &samples)
         };
-        let trial = prepared.trial(machine, Measures::AXES, false);
+        let trial = prepared.trial(machine, &machine.config, Measures::AXES, false);
         trial::run(&trial, prepared.source(), callback).map_err(|error| signals.error(error))?;
         Ok(writer.finish()?)
     })
@@ -227,18 +233,24 @@ pub fn report(
         let mut signals = SignalCheck::new();
         let mut part =
             prepared.part.take().map(|(track, name)| (LineErrors::new(&machine.config), track, name));
-        let mut feed = FeedAlongPath::default();
+        let mut path = ToolPath::default();
         let callback = |tick: Tick<'_>| {
             if let Some((lines, track, _)) = &mut part {
-                lines.add(&tick, track).iter().for_each(|cycle| feed.add(cycle));
+                lines.add(&tick, track).iter().for_each(|cycle| path.add(cycle));
             }
             if tick.position_instant { signals.cycle() } else { Ok(()) }
         };
-        let trial = prepared.trial(machine, Measures::ALL, true);
+        let trial = prepared.trial(machine, &machine.config, Measures::ALL, true);
         let outcome =
             trial::run(&trial, prepared.source(), callback).map_err(|error| signals.error(error))?;
-        let part = part.map(|(lines, track, name)| lines.finish(&name, &track, |cycle| feed.add(cycle)));
-        let part_program = part.transpose()?.map(|figures| ProgramReport { figures, feed });
+        let part_program = match part {
+            Some((lines, track, name)) => {
+                let figures = lines.finish(&name, PROGRAMS, &track, |cycle| path.add(cycle))?;
+                path.texts = line_texts(&name, PROGRAMS, &path.lines())?;
+                Some(ProgramReport { figures, path })
+            }
+            None => None,
+        };
         let run = SimulatedRun {
             controller: controller_name(&machine.parameters),
             changes: Vec::new(),
@@ -256,7 +268,6 @@ pub fn report(
             machine: machine.config.name(),
             runs: std::slice::from_ref(&run),
             sections: Vec::new(),
-            scatters: &[],
             provenance: vec![("program".to_owned(), program)],
         };
         let mut text = Vec::new();

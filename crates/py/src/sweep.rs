@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 use virtual_axes_core::config::MachineConfig;
-use virtual_axes_core::trial::{self, Figures, GridRows, Measures, SetpointSource, Trial, TrialError};
+use virtual_axes_core::trial::{self, Figures, Measures, Trial, TrialError};
 use virtual_axes_io::files::figures_json;
 
 use crate::convert::{check_stopped, interruptible, value_error};
@@ -31,19 +31,7 @@ struct Sweep<'a> {
 
 impl Sweep<'_> {
     fn trial<'t>(&self, machine: &'t MachineConfig) -> Trial<'t> {
-        let node = self.base.parameters.node_config();
-        Trial {
-            machine,
-            program: self.prepared.program.clone(),
-            allow_nonzero_end_velocity: node.allow_nonzero_velocity_at_trajectory_end,
-            record: false,
-            measures: self.measures,
-        }
-    }
-
-    fn setpoints(&self) -> SetpointSource<'_> {
-        let rows = &self.prepared.rows;
-        SetpointSource::Grid(Box::new(GridRows::new(&rows.joints, &rows.values)))
+        self.prepared.trial(self.base, machine, self.measures, false)
     }
 
     /// Returns the axes that differ in a batch that can run as lanes beside each other; `None` if a variant differs in
@@ -72,12 +60,12 @@ impl Sweep<'_> {
         let go_on = || check_stopped(self.stopped);
         if let Some(own) = self.own_axes(batch).filter(|own| !own.is_empty()) {
             let trial = self.trial(&self.base.config);
-            if let Ok(figures) = trial::run_variants(&trial, self.setpoints(), batch, &own, go_on) {
+            if let Ok(figures) = trial::run_variants(&trial, self.prepared.source(), batch, &own, go_on) {
                 return figures.into_iter().map(Ok).collect();
             }
         }
         let one = |machine: &MachineConfig| -> Result<Figures, TrialError> {
-            Ok(trial::run(&self.trial(machine), self.setpoints(), |_| go_on())?.figures)
+            Ok(trial::run(&self.trial(machine), self.prepared.source(), |_| go_on())?.figures)
         };
         batch.iter().map(|machine| one(machine).map_err(|error| error.to_string())).collect()
     }

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use pyo3::prelude::*;
 use serde_json::Value;
-use virtual_axes_core::trial::{GridRows, SetpointSource};
+use virtual_axes_core::trial::SetpointSource;
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::tune::{
     Cost, MarginLimits, Progress, TuningProblem, TuningResult, TuningSearch, Workload,
@@ -70,8 +70,7 @@ impl Progress for StopFlag<'_> {
 
 fn workload(py: Python<'_>, machine: &PyMachine, (name, _, psec): &NamedPath<'_>) -> PyResult<Workload> {
     let prepared = psec.prepare(py, machine)?;
-    let rows = GridRows::new(&prepared.rows.joints, &prepared.rows.values);
-    let source = SetpointSource::Grid(Box::new(rows));
+    let source = SetpointSource::Grid(Box::new(prepared.rows.source()));
     Workload::read(name, prepared.program, source, || Ok(())).map_err(value_error)
 }
 

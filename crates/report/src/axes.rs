@@ -1,183 +1,243 @@
-//! Sections of the axes: plots of position, following error, velocity and current.
+//! Sections of errors and axes: contour error, feed, circles, and the signals of each axis over time.
 
-use virtual_axes_core::assess::AxisTrace;
+use virtual_axes_core::assess::{AxisTrace, CircleTrace, SignalRecording, ToolTrace};
 
-use super::html::{Caption, run_class};
-use super::limits;
-use super::page::Page;
-use super::scale::Extent;
-use super::strip::{Strip, error_strip, legend, peak, run_series, strip, time};
-use super::text::{capital, listed};
-use super::time_plot::{TimePlot, TimeSeries};
+use super::chart::{Band, BandClass, Chart, ChartAxis, ChartForm, ChartSeries, Panel, SeriesStyle};
+use super::document::Section;
+use super::extent::peak;
+use super::text::{axis_name, listed, rounded};
+use super::tool_path::ToolPath;
 use super::unit::DisplayUnit;
 
 /// Peak below which a component of the current is not plotted, A.
 const NEGLIGIBLE_CURRENT: f64 = 1e-3;
+/// Orientation error below which it is not plotted, rad: 0.01 mdeg.
+const NEGLIGIBLE_ORIENTATION_ERROR: f64 = 1.7e-7;
+/// Maximum number of circles that are plotted; the table of figures contains all circles.
+const MOST_CIRCLES: usize = 6;
+/// Difference of radii below which circles are equal, m.
+const SAME_RADIUS: f64 = 1e-6;
+
+/// One run of a report.
+#[derive(Debug, Clone)]
+pub struct ReportRun<'a> {
+    /// Name that distinguishes the run from the others, for example its controller.
+    pub title: &'a str,
+    /// Names and values: machine, controller, changed parameters. Values with equal names share a row.
+    pub facts: Vec<(String, String)>,
+    /// Signals to plot.
+    pub recording: &'a SignalRecording,
+    /// Path of a part program with its lines and feeds.
+    pub program: Option<&'a ToolPath>,
+}
 
 /// Accessor of one signal of an axis.
 type Signal = fn(&AxisTrace) -> &[f64];
 
-/// An axis with its traces in all runs that contain it.
-struct Axis<'a> {
-    name: String,
-    /// Index of the run, sample times in s, signals.
-    traces: Vec<(usize, &'a [f64], &'a AxisTrace)>,
+/// An axis with its traces in the runs that contain it, each with the index of its run.
+type Axis<'a> = (&'a AxisTrace, Vec<(usize, &'a AxisTrace)>);
+
+/// Returns a chart over the time of the runs.
+fn over_time(title: impl Into<String>, panels: Vec<Panel>) -> Chart {
+    let form = ChartForm::RunTime;
+    Chart { form, ..Chart::new(title, ChartAxis::new("Time", DisplayUnit::SECOND), panels) }
 }
 
-/// Writes a section for each axis that moves in any run, and a sentence about the stationary axes.
-pub(super) fn sections(page: &mut Page) {
-    let axes = axes(page);
-    let Some(time) = time(page) else {
-        page.html.paragraph("Nothing was recorded.");
-        return;
+/// Returns a panel that includes 0.
+fn panel(quantity: impl Into<String>, unit: DisplayUnit, series: Vec<ChartSeries>) -> Panel {
+    Panel::new(ChartAxis::new(quantity, unit).with_zero(), series)
+}
+
+/// Returns a signal of a run over its time.
+fn signal(runs: &[ReportRun], run: usize, label: &str, style: SeriesStyle, values: &[f64]) -> ChartSeries {
+    ChartSeries::from_xy(label, style, &runs[run].recording.time, values).of_run(run)
+}
+
+/// Returns a text with the title of the run if there are several runs.
+fn for_run(runs: &[ReportRun], run: usize, text: &str) -> String {
+    if runs.len() > 1 { format!("{text}, {}", runs[run].title) } else { text.to_owned() }
+}
+
+/// Returns the section of contour error, orientation error, feed and circles.
+pub(super) fn errors(runs: &[ReportRun]) -> Option<Section> {
+    let of_runs = |values: fn(&ToolTrace) -> &[f64]| -> Vec<ChartSeries> {
+        let tools = runs.iter().enumerate().filter_map(|(i, run)| Some((i, run.recording.tool.as_ref()?)));
+        let series = |(i, tool)| signal(runs, i, runs[i].title, SeriesStyle::Line(i), values(tool));
+        tools.map(series).filter(|series| !series.points.is_empty()).collect()
     };
-    let (moving, at_rest): (Vec<_>, Vec<_>) =
-        axes.into_iter().partition(|axis| axis.traces.iter().any(|(_, _, trace)| trace.moves));
-    for axis in &moving {
-        page.html.open_section("axis", &format!("{} axis", axis.name));
-        position(page, axis, time);
-        let kind = axis.traces[0].2.kind;
-        let of = format!("{} axis", axis.name);
-        let series = |page: &Page, signal: Signal| -> Vec<TimeSeries> {
-            axis.traces.iter().map(|&(run, time, trace)| run_series(page, run, time, signal(trace))).collect()
+    let orientation = of_runs(|tool| &tool.orientation_error);
+    let turns =
+        orientation.iter().any(|s| peak(s.points.iter().map(|p| p[1])) > NEGLIGIBLE_ORIENTATION_ERROR);
+    let programs = runs.iter().enumerate().filter_map(|(i, run)| Some((i, run.program?)));
+    let feeds = programs.flat_map(|(i, program)| program.feeds(i, &for_run(runs, i, "reached"))).collect();
+    let panels = vec![
+        panel("Contour error", DisplayUnit::MICROMETER, of_runs(|tool| &tool.contour_error)),
+        panel("Orientation error", DisplayUnit::MILLIDEGREE, if turns { orientation } else { Vec::new() }),
+        panel("Feed", DisplayUnit::METER_PER_MINUTE, feeds),
+    ];
+    let panels: Vec<Panel> = panels.into_iter().filter(|panel| !panel.series.is_empty()).collect();
+    let mut section = Section::new("Errors of the tool");
+    if !panels.is_empty() {
+        let note = "distance of the tool tip from the path; feed: speed of the tip".to_owned();
+        section.charts.push(Chart { note, ..over_time("Errors and feed", panels) });
+    }
+    let mut circles = circles(runs);
+    if circles.len() > MOST_CIRCLES {
+        section.paragraphs.push(format!("{} more circles are not plotted.", circles.len() - MOST_CIRCLES));
+        circles.truncate(MOST_CIRCLES);
+    }
+    section.charts.extend(circles);
+    (!section.charts.is_empty()).then_some(section)
+}
+
+/// Returns a chart for each distinct circle of the runs.
+fn circles(runs: &[ReportRun]) -> Vec<Chart> {
+    let all = runs.iter().enumerate().flat_map(|(i, run)| run.recording.circles.iter().map(move |c| (i, c)));
+    let mut distinct: Vec<Vec<(usize, &CircleTrace)>> = Vec::new();
+    for (run, circle) in all {
+        let is_same = |other: &CircleTrace| {
+            other.plane == circle.plane && (other.radius - circle.radius).abs() < SAME_RADIUS
         };
-        let velocity =
-            Strip { title: "Velocity", note: "", quantity: "Velocity", unit: DisplayUnit::velocity(kind) };
-        let lines = series(page, |t| &t.velocity);
-        strip(page, &of, time, velocity, lines);
-        let note = "PSEC − SP, including the delay α";
-        let following =
-            Strip { title: "Following error", note, quantity: "Error", unit: DisplayUnit::error(kind) };
-        let lines = series(page, |t| &t.following_error);
-        error_strip(page, &of, time, following, lines);
-        let note = "PSEC delayed by α − SP";
-        let compensated = Strip { title: "Delay-compensated following error", note, ..following };
-        let lines = series(page, |t| &t.delay_compensated_following_error);
-        error_strip(page, &of, time, compensated, lines);
-        currents(page, axis, time);
-        page.html.close_section();
+        match distinct.iter_mut().find(|group| is_same(group[0].1)) {
+            Some(group) => group.push((run, circle)),
+            None => distinct.push(vec![(run, circle)]),
+        }
     }
-    if !at_rest.is_empty() {
-        let names: Vec<String> =
-            at_rest.iter().enumerate().map(|(i, axis)| stationary(axis, i == 0)).collect();
+    let chart = |group: &Vec<(usize, &CircleTrace)>| {
+        let circle = group[0].1;
+        let series = group.iter().map(|&(run, circle)| {
+            let direction = if circle.counterclockwise { "counterclockwise" } else { "clockwise" };
+            let label = for_run(runs, run, direction);
+            let style =
+                SeriesStyle::Line(if runs.len() > 1 { run } else { usize::from(!circle.counterclockwise) });
+            ChartSeries::from_xy(label, style, &circle.angle, &circle.deviation).of_run(run)
+        });
+        let axes = circle.plane.clone().map(|name| axis_name(&name));
+        let radius = rounded(circle.radius / DisplayUnit::MILLIMETER.size);
+        let title = format!("{}–{} circle, R {radius}\u{a0}mm", axes[0], axes[1]);
+        let x = ChartAxis::new("Angle", DisplayUnit::DEGREE);
+        let panels = vec![panel("Radial deviation", DisplayUnit::MICROMETER, series.collect())];
+        let note = "radial deviation magnified; the bold ring is the nominal radius".to_owned();
+        Chart { note, form: ChartForm::Circle(axes), ..Chart::new(title, x, panels) }
+    };
+    distinct.iter().map(chart).collect()
+}
+
+/// Returns a section for each axis that moves in any run, and one about the stationary axes.
+pub(super) fn sections(runs: &[ReportRun]) -> Vec<Section> {
+    if runs.iter().all(|run| run.recording.time.is_empty()) {
+        let paragraphs = vec!["Nothing was recorded.".to_owned()];
+        return vec![Section { paragraphs, ..Section::default() }];
+    }
+    let mut axes: Vec<Axis> = Vec::new();
+    let traces = runs.iter().enumerate().flat_map(|(i, run)| run.recording.axes.iter().map(move |t| (i, t)));
+    for (run, trace) in traces {
+        match axes.iter_mut().find(|(axis, _)| axis.name == trace.name && axis.kind == trace.kind) {
+            Some((_, traces)) => traces.push((run, trace)),
+            None => axes.push((trace, vec![(run, trace)])),
+        }
+    }
+    let (moving, at_rest): (Vec<Axis>, Vec<Axis>) =
+        axes.into_iter().partition(|(_, traces)| traces.iter().any(|(_, trace)| trace.moves));
+    let mut sections: Vec<Section> = moving.iter().map(|axis| of_axis(runs, axis)).collect();
+    let names: Vec<String> = at_rest.iter().map(stationary).collect();
+    if !names.is_empty() {
         let verb = if names.len() == 1 { "is" } else { "are" };
-        page.html.open_section("standing", "Stationary axes");
-        page.html.paragraph(&format!("{} {verb} stationary.", listed(&names)));
-        page.html.close_section();
+        let text = format!("{} {verb} stationary (largest following error).", listed(&names));
+        sections.push(Section { paragraphs: vec![text], ..Section::new("Stationary axes") });
     }
+    sections
 }
 
 /// Returns the name of a stationary axis with its largest following error.
-fn stationary(axis: &Axis, explained: bool) -> String {
-    let errors = axis.traces.iter().flat_map(|(_, _, t)| t.following_error.iter().copied());
-    let error =
-        DisplayUnit::error(axis.traces[0].2.kind).format(Extent::of(errors).map_or(0.0, |e| e.peak()));
-    format!("{} ({}{error})", axis.name, if explained { "largest following error " } else { "" })
+fn stationary((axis, traces): &Axis) -> String {
+    let error = peak(traces.iter().flat_map(|(_, trace)| trace.following_error.iter().copied()));
+    format!("{} ({})", axis_name(&axis.name), DisplayUnit::error(axis.kind).format(error))
 }
 
-/// Collects the axes of all runs by name and kind, in order of first occurrence.
-fn axes<'a>(page: &Page<'a>) -> Vec<Axis<'a>> {
-    let mut axes: Vec<Axis> = Vec::new();
-    let is_same = |a: &AxisTrace, b: &AxisTrace| a.name == b.name && a.kind == b.kind;
-    for (i, run) in page.runs.iter().enumerate() {
-        for trace in &run.recording.axes {
-            let entry = (i, run.recording.time.as_slice(), trace);
-            match axes.iter_mut().find(|a| is_same(a.traces[0].2, trace)) {
-                Some(axis) => axis.traces.push(entry),
-                None => axes.push(Axis { name: axis_name(&trace.name), traces: vec![entry] }),
-            }
-        }
-    }
-    axes
-}
-
-/// Returns a joint name in the notation of machine axes: a single letter becomes a capital.
-pub(super) fn axis_name(name: &str) -> String {
-    if name.chars().count() == 1 { capital(name) } else { name.to_owned() }
-}
-
-/// Plots setpoints as a pale band and positions above it.
-fn position(page: &mut Page, axis: &Axis, time: Extent) {
-    let mut series: Vec<TimeSeries> = Vec::new();
-    for &(_, time, trace) in &axis.traces {
-        let class = "setpoint".to_owned();
-        // Runs of the same motion share one setpoint line.
-        if !series.iter().any(|s| s.time == time && s.values == trace.psec) {
-            series.push(TimeSeries { label: "setpoint (PSEC)".to_owned(), class, time, values: &trace.psec });
-        }
-    }
-    let setpoints = series.len();
-    for &(run, time, trace) in &axis.traces {
-        let one = run_series(page, run, time, &trace.position);
-        let label = if page.is_comparison() { one.label.clone() } else { "position (SP)".to_owned() };
-        series.push(TimeSeries { label, ..one });
-    }
-    let mut legend = legend(&series);
-    legend.drain(1..setpoints.max(1));
-    let unit = DisplayUnit::position(axis.traces[0].2.kind);
-    let caption = Caption { title: "Setpoint and position".to_owned(), note: String::new(), legend };
-    let plot = TimePlot {
-        quantity: "Position",
-        unit,
-        from_zero: false,
-        time,
-        series,
-        at_least: None,
-        shaded: Vec::new(),
+fn of_axis(runs: &[ReportRun], (axis, traces): &Axis) -> Section {
+    let of_runs = |values: Signal| -> Vec<ChartSeries> {
+        let series = |&(run, trace): &(usize, &AxisTrace)| {
+            signal(runs, run, runs[run].title, SeriesStyle::Line(run), values(trace))
+        };
+        traces.iter().map(series).collect()
     };
-    let title = format!("{} axis: setpoint and position", axis.name);
-    page.html.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
+    let mut positions: Vec<ChartSeries> = Vec::new();
+    for &(run, trace) in traces {
+        let setpoint = signal(runs, run, "setpoint (PSEC)", SeriesStyle::Commanded, &trace.psec);
+        // Runs of the same motion share one setpoint line.
+        if !positions.iter().any(|other| other.points == setpoint.points) {
+            positions.push(ChartSeries { run: None, ..setpoint });
+        }
+    }
+    positions.extend(of_runs(|t| &t.position));
+    let error = DisplayUnit::error(axis.kind);
+    let position = ChartAxis::new("Position", DisplayUnit::position(axis.kind));
+    let mut panels = vec![
+        Panel::new(position, positions),
+        panel("Velocity", DisplayUnit::velocity(axis.kind), of_runs(|t| &t.velocity)),
+        panel("Following error", error, of_runs(|t| &t.following_error)),
+        panel("Delay-compensated error", error, of_runs(|t| &t.delay_compensated_following_error)),
+    ];
+    panels.extend(traces.iter().map(|(run, trace)| current(runs, *run, trace)));
+    let name = axis_name(&axis.name);
+    let title = format!("{name} axis");
+    let note = "following error: PSEC − SP, with the delay α or compensated for it".to_owned();
+    let at_limit = traces.iter().flat_map(|(run, trace)| ranges(&runs[*run].recording.time, trace));
+    let bands = at_limit.map(|[from, to]| Band::new(BandClass::AtLimit, from, to)).collect();
+    Section { charts: vec![Chart { note, bands, ..over_time(title.clone(), panels) }], ..Section::new(title) }
 }
 
-/// Plots the current of each run with its components, all runs at one scale.
-fn currents(page: &mut Page, axis: &Axis, time: Extent) {
-    let parts: [(&str, &str, Signal); 3] = [
-        ("friction", "part friction", |t| &t.friction_current),
-        ("gravity", "part gravity", |t| &t.gravity_current),
-        ("load", "part load", |t| &t.load_current),
+/// Returns the panel of the current of a run with its components.
+fn current(runs: &[ReportRun], run: usize, trace: &AxisTrace) -> Panel {
+    let line = |label: &str, style, values: &[f64]| signal(runs, run, label, style, values);
+    let mut series = vec![
+        line("current setpoint", SeriesStyle::Commanded, &trace.current_setpoint),
+        line("motor current (SMC)", SeriesStyle::Line(run), &trace.current),
     ];
-    let all: [Signal; 2] = [|t| &t.current, |t| &t.current_setpoint];
-    let all = all.into_iter().chain(parts.map(|(_, _, signal)| signal));
-    let range =
-        all.flat_map(|signal| axis.traces.iter().map(move |(_, _, t)| Extent::of(signal(t).iter().copied())));
-    let range = range.fold(None, Extent::join);
-    for &(run, times, trace) in &axis.traces {
-        let line = |label: &str, class: String, signal: Signal| TimeSeries {
-            label: label.to_owned(),
-            class,
-            time: times,
-            values: signal(trace),
-        };
-        let mut series = vec![
-            line("setpoint", "setpoint".to_owned(), |t| &t.current_setpoint),
-            line("motor current (SMC)", format!("line solid {}", run_class(run)), |t| &t.current),
-        ];
-        let (plotted, negligible): (Vec<_>, Vec<_>) =
-            parts.into_iter().partition(|(_, _, signal)| peak(signal(trace)) > NEGLIGIBLE_CURRENT);
-        series
-            .extend(plotted.into_iter().map(|(label, class, signal)| line(label, class.to_owned(), signal)));
-        let shaded = limits::ranges(times, trace);
-        let negligible: Vec<String> = negligible.into_iter().map(|(label, ..)| label.to_owned()).collect();
-        let note = match negligible.as_slice() {
-            [] => String::new(),
-            [one] => format!("{one} component is negligible"),
-            several => format!("{} components are negligible", listed(several)),
-        };
-        let mut legend = legend(&series);
-        if !shaded.is_empty() {
-            legend.push(("band at-limit".to_owned(), "at a limit".to_owned()));
+    let parts = [
+        ("friction", &trace.friction_current),
+        ("gravity", &trace.gravity_current),
+        ("load", &trace.load_current),
+    ];
+    for (i, (label, values)) in parts.into_iter().enumerate() {
+        if peak(values.iter().copied()) > NEGLIGIBLE_CURRENT {
+            series.push(line(label, SeriesStyle::Line(run + 1 + i), values));
         }
-        let caption = Caption { title: page.caption_for_run("Current", run), note, legend };
-        let plot = TimePlot {
-            quantity: "Current",
-            unit: DisplayUnit::AMPERE,
-            from_zero: true,
-            time,
-            series,
-            at_least: range,
-            shaded,
-        };
-        let title = page.caption_for_run(&format!("{} axis: current and its components", axis.name), run);
-        page.html.figure("strip", &caption, &title, |id, title| plot.draw(id, title));
     }
+    panel(for_run(runs, run, "Current"), DisplayUnit::AMPERE, series)
+}
+
+/// Returns a sentence for each axis and run that reached a limit.
+pub(super) fn limits(runs: &[ReportRun]) -> Vec<String> {
+    let axes =
+        runs.iter().enumerate().flat_map(|(i, run)| run.recording.axes.iter().map(move |axis| (i, axis)));
+    let sentence = |(run, axis): (usize, &AxisTrace)| {
+        let found = ranges(&runs[run].recording.time, axis);
+        let [first, _] = found.first()?;
+        let times = if found.len() == 1 { "once".to_owned() } else { format!("{} times", found.len()) };
+        let name = for_run(runs, run, &axis_name(&axis.name));
+        Some(format!(
+            "{name}: at a limit of speed, current or voltage {times}, first at {first:.3} s; the plots of the axis are \
+             shaded there."
+        ))
+    };
+    axes.filter_map(sentence).collect()
+}
+
+/// Returns the time ranges in which an axis is at a limit, s: begin and end.
+fn ranges(time: &[f64], axis: &AxisTrace) -> Vec<[f64; 2]> {
+    let mut found: Vec<[f64; 2]> = Vec::new();
+    let ends = time.iter().skip(1).chain(time.last());
+    let mut was_limited = false;
+    for ((&begin, &end), &share) in time.iter().zip(ends).zip(&axis.saturation) {
+        let is_limited = share > 0.0;
+        match found.last_mut() {
+            Some(range) if is_limited && was_limited => range[1] = end,
+            _ if is_limited => found.push([begin, end]),
+            _ => {}
+        }
+        was_limited = is_limited;
+    }
+    found
 }

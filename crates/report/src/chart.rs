@@ -1,14 +1,12 @@
 //! Contents of a chart: pairs of values in one or several panels with a common x axis.
 
-use super::html::run_class;
-use super::markers::Marker;
 use super::unit::DisplayUnit;
 
 /// A plot of pairs of values on linear or logarithmic axes.
 ///
 /// Values are in SI units and are labeled in the unit of their axis; a [`DisplayUnit`] of size 1 shows them
 /// unchanged. Values that are not finite, or beyond ±1e12 of the unit, are omitted and break a line. Long
-/// series are decimated to the resolution of the plot; peaks and isolated points are kept.
+/// series are decimated; peaks are kept.
 ///
 /// ```
 /// use virtual_axes_report::{Band, BandClass, Chart, ChartAxis, Document, Guide, Panel};
@@ -48,6 +46,20 @@ pub struct Chart {
     pub bands: Vec<Band>,
     /// Values of x that are marked by a vertical line in all panels.
     pub lines: Vec<Guide>,
+    /// Meaning of x.
+    pub form: ChartForm,
+}
+
+/// Meaning of x of a chart.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum ChartForm {
+    /// Any quantity; the chart zooms by itself.
+    #[default]
+    Plain,
+    /// Time of the runs of the page: all charts over it zoom together, and can be plotted over the path.
+    RunTime,
+    /// Polar angle about the center of a circle, from the first named axis to the second; y is the radial deviation.
+    Circle([String; 2]),
 }
 
 /// One panel of a chart.
@@ -100,6 +112,8 @@ pub struct ChartSeries {
     pub points: Vec<[f64; 2]>,
     /// Half length of the error bar of each point, SI units. A missing or non-positive entry draws no bar.
     pub errors: Vec<f64>,
+    /// Index of the run whose signal it is; the page can hide runs.
+    pub run: Option<usize>,
 }
 
 /// Drawing style of a series.
@@ -145,6 +159,8 @@ pub enum BandClass {
     Accelerating,
     /// Accepted values, or the spread of values.
     Interval,
+    /// Speed, current or voltage at its limit.
+    AtLimit,
 }
 
 /// A value that is marked by a line across the panel.
@@ -160,7 +176,8 @@ impl Chart {
     /// Creates a chart without note, bands and lines.
     pub fn new(title: impl Into<String>, x: ChartAxis, panels: Vec<Panel>) -> Self {
         let title = title.into();
-        Chart { title, note: String::new(), x, panels, bands: Vec::new(), lines: Vec::new() }
+        let (bands, lines, form) = (Vec::new(), Vec::new(), ChartForm::Plain);
+        Chart { title, note: String::new(), x, panels, bands, lines, form }
     }
 }
 
@@ -196,7 +213,7 @@ impl ChartAxis {
 impl ChartSeries {
     /// Creates a series without error bars from x and y of each point, SI units.
     pub fn new(label: impl Into<String>, style: SeriesStyle, points: Vec<[f64; 2]>) -> Self {
-        ChartSeries { label: label.into(), style, points, errors: Vec::new() }
+        ChartSeries { label: label.into(), style, points, errors: Vec::new(), run: None }
     }
 
     /// Creates a series without error bars from two lists, SI units. Surplus elements of the longer list are
@@ -209,38 +226,24 @@ impl ChartSeries {
     pub fn with_errors(self, errors: Vec<f64>) -> Self {
         ChartSeries { errors, ..self }
     }
+
+    /// Assigns the series to a run, by its index.
+    pub fn of_run(self, run: usize) -> Self {
+        ChartSeries { run: Some(run), ..self }
+    }
 }
 
 impl SeriesStyle {
-    /// Returns the CSS class.
-    pub(super) fn class(self) -> String {
-        let index = self.index();
+    /// Returns the name of the style, and its index among the line or marker styles.
+    pub(super) fn name(self) -> (&'static str, usize) {
         match self {
-            SeriesStyle::Commanded => "setpoint".to_owned(),
-            SeriesStyle::Points(_) => {
-                format!("points {} {}", Marker::for_group(index).name(), run_class(index))
-            }
-            _ => format!("line {}", run_class(index)),
+            SeriesStyle::Commanded => ("commanded", 0),
+            SeriesStyle::Measured => ("line", 0),
+            SeriesStyle::Simulated => ("line", 1),
+            SeriesStyle::Line(index) => ("line", index),
+            SeriesStyle::Steps(index) => ("steps", index),
+            SeriesStyle::Points(index) => ("points", index),
         }
-    }
-
-    /// Returns the CSS class of the error bars.
-    pub(super) fn error_class(self) -> String {
-        format!("error {}", run_class(self.index()))
-    }
-
-    /// Returns the index among the line or marker styles.
-    fn index(self) -> usize {
-        match self {
-            SeriesStyle::Commanded | SeriesStyle::Measured => 0,
-            SeriesStyle::Simulated => 1,
-            SeriesStyle::Line(index) | SeriesStyle::Steps(index) | SeriesStyle::Points(index) => index,
-        }
-    }
-
-    /// Returns true for markers, false for lines.
-    pub(super) fn is_points(self) -> bool {
-        matches!(self, SeriesStyle::Points(_))
     }
 }
 
@@ -252,6 +255,7 @@ impl Band {
             BandClass::ConstantVelocity => "constant velocity",
             BandClass::Accelerating => "accelerating",
             BandClass::Interval => "interval",
+            BandClass::AtLimit => "at a limit",
         };
         Band { class, label: label.to_owned(), from, to }
     }
@@ -263,13 +267,14 @@ impl Band {
 }
 
 impl BandClass {
-    /// Returns the CSS class.
+    /// Returns the name of the color in the style sheet.
     pub(super) fn name(self) -> &'static str {
         match self {
             BandClass::Static => "static",
             BandClass::ConstantVelocity => "constant",
             BandClass::Accelerating => "accelerating",
             BandClass::Interval => "interval",
+            BandClass::AtLimit => "at-limit",
         }
     }
 }

@@ -3,17 +3,26 @@
 use std::io;
 
 use super::chart::Chart;
+use super::decimate;
 use super::html::Html;
-use super::table::{Table, fact, names};
+use super::table::Table;
 use super::text::Text;
+use super::tool_path::RunPath;
 
-/// A self-contained page of sections, in the style of a [`Report`](super::Report).
+/// Largest number of points in the charts of a page, so that a page has at most 8 MB.
+const MOST_POINTS: usize = 160_000;
+
+/// A self-contained page of sections.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Document {
     /// Heading, and title of the browser window.
     pub title: String,
     /// Description in one or two sentences; can be empty.
     pub description: String,
+    /// Result in a few lines; can be empty.
+    pub verdict: Vec<String>,
+    /// Titles of the runs whose signals the page can hide.
+    pub runs: Vec<String>,
     /// Names and values. Values with equal names share a row.
     pub facts: Vec<(String, String)>,
     /// Sections in their order on the page.
@@ -23,7 +32,7 @@ pub struct Document {
 /// A part of a page. Its contents are in the order of the fields; each list can be empty.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Section {
-    /// Heading.
+    /// Heading; can be empty.
     pub heading: String,
     /// Paragraphs of plain text.
     pub paragraphs: Vec<String>,
@@ -31,6 +40,8 @@ pub struct Section {
     pub notices: Vec<Notice>,
     /// Tables.
     pub tables: Vec<Table>,
+    /// Tool paths of runs, in one figure beside text and tables.
+    pub paths: Vec<RunPath>,
     /// Charts.
     pub charts: Vec<Chart>,
 }
@@ -85,14 +96,11 @@ impl Document {
 
     fn page(&self) -> String {
         let mut html = Html::begin(&self.title, &self.description);
-        if !self.facts.is_empty() {
-            let rows: Vec<_> =
-                names(&self.facts).into_iter().map(|name| (name, vec![fact(&self.facts, name)])).collect();
-            html.append(format_args!("<section class=\"facts\">\n"));
-            html.facts(&[], &rows);
-            html.close_section();
-        }
-        self.sections.iter().for_each(|section| section.append_to(&mut html));
+        html.verdict(&self.verdict);
+        html.switches(&self.runs.iter().map(String::as_str).collect::<Vec<_>>());
+        html.table(&Table::of_facts(&[], &[&self.facts]));
+        let most = decimate::limit(self.sections.iter().flat_map(|section| &section.charts), MOST_POINTS);
+        self.sections.iter().for_each(|section| section.append_to(&mut html, most));
         html.end()
     }
 }
@@ -103,8 +111,23 @@ impl Section {
         Section { heading: heading.into(), ..Section::default() }
     }
 
-    pub(super) fn append_to(&self, html: &mut Html) {
-        html.open_section("part figures", &self.heading);
+    /// Returns true if nothing stands below the heading.
+    pub(super) fn is_empty(&self) -> bool {
+        let Section { heading: _, paragraphs, notices, tables, paths, charts } = self;
+        let has_text = !paragraphs.is_empty() || !notices.is_empty();
+        !has_text && tables.iter().all(|table| table.rows.is_empty()) && paths.is_empty() && charts.is_empty()
+    }
+
+    fn append_to(&self, html: &mut Html, most: usize) {
+        let class = if self.paths.is_empty() { "" } else { " class=\"overview\"" };
+        html.append(format_args!("<section{class}>\n"));
+        if !self.heading.is_empty() {
+            html.append(format_args!("<h2>{}</h2>\n", Text(&self.heading)));
+        }
+        let has_text = !self.paragraphs.is_empty() || !self.notices.is_empty() || !self.tables.is_empty();
+        if has_text {
+            html.append(format_args!("<div>\n"));
+        }
         self.paragraphs.iter().for_each(|text| html.paragraph(text));
         for Notice { level, text } in &self.notices {
             let (class, word) = level.style();
@@ -114,7 +137,11 @@ impl Section {
             ));
         }
         self.tables.iter().for_each(|table| html.table(table));
-        self.charts.iter().for_each(|chart| chart.append_to(html));
-        html.close_section();
+        if has_text {
+            html.append(format_args!("</div>\n"));
+        }
+        html.path(&self.paths);
+        self.charts.iter().for_each(|chart| html.chart(chart, most));
+        html.append(format_args!("</section>\n"));
     }
 }

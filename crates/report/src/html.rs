@@ -1,47 +1,54 @@
-//! HTML elements of every page: head, sections, paragraphs, and figures with captions and legends.
+//! HTML elements of every page: head, sections, paragraphs, figures and scripts.
 
 use std::fmt;
 
-use super::markers::Marker;
-use super::svg::Svg;
+use serde_json::Value;
+
+use super::chart::Chart;
 use super::text::Text;
+use super::tool_path::RunPath;
 
 /// Style sheet: layout, and colors for light, dark and print themes.
 const STYLE: &str = include_str!("style.css");
-/// Content security policy: nothing is loaded and no script runs, regardless of the text of a page.
-const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'";
+/// Script that plots the figures of a page.
+const SCRIPT: &str = include_str!("page.js");
+/// Content security policy: nothing is loaded, regardless of the text of a page.
+const POLICY: &str =
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:";
 /// Number of line styles in the style sheet.
 const LINE_STYLES: usize = 6;
-/// Width and height of a sample in a legend, pixels.
-const SWATCH: [f64; 2] = [34.0, 12.0];
+
+/// Returns plotly.js, the first of the scripts that plotly embeds; the other one is for formulas.
+fn plotly_script() -> String {
+    let scripts = plotly::Plot::offline_js_sources();
+    let (_, script) = scripts.split_once('>').unwrap_or_default();
+    script.split("</script>").next().unwrap_or_default().to_owned()
+}
 
 /// A page while it is written.
 #[derive(Debug)]
 pub(super) struct Html {
     text: String,
-    figures: usize,
-}
-
-/// Caption above a plot.
-#[derive(Debug, Default)]
-pub(super) struct Caption {
-    /// Title of the plot.
-    pub title: String,
-    /// Remark behind the title; can be empty.
-    pub note: String,
-    /// CSS class and label of each legend entry.
-    pub legend: Vec<(String, String)>,
+    has_figures: bool,
 }
 
 /// Returns the CSS class of the lines of a run, or of one of several lines, by index.
-pub(super) fn run_class(run: usize) -> String {
+fn run_class(run: usize) -> String {
     format!("run-{}", run % LINE_STYLES + 1)
+}
+
+/// Returns a sample of a run's line as SVG.
+pub(super) fn swatch(run: usize) -> String {
+    let class = run_class(run);
+    format!(
+        "<svg class=\"swatch\" viewBox=\"0 0 34 12\" aria-hidden=\"true\"><path class=\"line {class}\" d=\"M1 6h32\"/></svg>"
+    )
 }
 
 impl Html {
     /// Begins a page with its head and heading. An empty description is omitted.
     pub(super) fn begin(title: &str, description: &str) -> Html {
-        let mut html = Html { text: String::new(), figures: 0 };
+        let mut html = Html { text: String::new(), has_figures: false };
         let title = Text(title);
         html.append(format_args!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -60,10 +67,14 @@ impl Html {
     /// Ends the page and returns it.
     pub(super) fn end(mut self) -> String {
         self.append(format_args!(
-            "</main>\n<footer>{} {}</footer>\n</body>\n</html>\n",
+            "</main>\n<footer>{} {}</footer>\n",
             env!("CARGO_PKG_NAME"),
             env!("CARGO_PKG_VERSION")
         ));
+        if self.has_figures {
+            self.append(format_args!("<script>{}</script>\n<script>{SCRIPT}</script>\n", plotly_script()));
+        }
+        self.text.push_str("</body>\n</html>\n");
         self.text
     }
 
@@ -72,19 +83,24 @@ impl Html {
         let _ = fmt::write(&mut self.text, piece);
     }
 
-    /// Begins a section with a heading.
-    pub(super) fn open_section(&mut self, class: &str, heading: &str) {
-        self.append(format_args!("<section class=\"{class}\">\n<h2>{}</h2>\n", Text(heading)));
-    }
-
-    /// Ends a section.
-    pub(super) fn close_section(&mut self) {
-        self.append(format_args!("</section>\n"));
-    }
-
-    /// Appends the result in one line per compared run.
+    /// Appends the results in one line each.
     pub(super) fn verdict(&mut self, lines: &[String]) {
         lines.iter().for_each(|line| self.append(format_args!("<p class=\"verdict\">{}</p>\n", Text(line))));
+    }
+
+    /// Appends switches that hide and show the signals of the runs, unless there is only one; the script activates them.
+    pub(super) fn switches(&mut self, runs: &[&str]) {
+        if runs.len() < 2 {
+            return;
+        }
+        self.append(format_args!("<fieldset class=\"runs\" hidden><legend>Runs shown</legend>\n"));
+        for (run, title) in runs.iter().enumerate() {
+            let (line, title) = (swatch(run), Text(title));
+            self.append(format_args!(
+                "<label><input type=\"checkbox\" checked value=\"{run}\">{line}{title}</label>\n"
+            ));
+        }
+        self.append(format_args!("</fieldset>\n"));
     }
 
     /// Appends a paragraph.
@@ -92,64 +108,28 @@ impl Html {
         self.append(format_args!("<p>{}</p>\n", Text(text)));
     }
 
-    /// Begins a row of `count` plots side by side.
-    pub(super) fn open_row(&mut self, count: usize) {
-        // Four plots are more legible as two by two.
-        let columns = match count {
-            0 | 1 => 1,
-            2 | 4 => 2,
-            _ => 3,
-        };
-        self.append(format_args!("<div class=\"row of-{columns}\">\n"));
+    /// Appends a chart, whose series have at most about `most` points.
+    pub(super) fn chart(&mut self, chart: &Chart, most: usize) {
+        self.figure(&chart.title, &chart.note, chart.json(most));
     }
 
-    /// Ends a row.
-    pub(super) fn close_row(&mut self) {
-        self.append(format_args!("</div>\n"));
+    /// Appends the tool paths of runs in space; nothing without a path.
+    pub(super) fn path(&mut self, paths: &[RunPath]) {
+        if let Some((note, json)) = RunPath::figure(paths) {
+            self.figure("Path of the tool", note, json);
+        }
     }
 
-    /// Appends a figure whose SVG `draw` returns from an id and a title.
-    pub(super) fn figure(
-        &mut self,
-        class: &str,
-        caption: &Caption,
-        title: &str,
-        draw: impl FnOnce(&str, &str) -> String,
-    ) {
-        self.figures += 1;
+    fn figure(&mut self, title: &str, note: &str, json: Value) {
+        self.has_figures = true;
+        // No text within the JSON ends the script element.
+        let json = json.to_string().replace('<', "\\u003c");
+        let (title, note) = (Text(title), Text(note));
         self.append(format_args!(
-            "<figure class=\"{class}\">\n<figcaption><span class=\"title\">{}</span>",
-            Text(&caption.title)
+            "<figure>\n<figcaption><span class=\"title\">{title}</span> <span class=\"note\">{note}</span></figcaption>\n\
+             <div class=\"plot\" role=\"img\"></div>\n\
+             <noscript><p>This plot needs JavaScript.</p></noscript>\n\
+             <script type=\"application/json\">{json}</script>\n</figure>\n"
         ));
-        if !caption.note.is_empty() {
-            self.append(format_args!(" <span class=\"note\">{}</span>", Text(&caption.note)));
-        }
-        if !caption.legend.is_empty() {
-            self.append(format_args!(" <span class=\"legend\">"));
-            for (class, label) in &caption.legend {
-                self.append(format_args!("<span class=\"key\">{}{}</span> ", swatch(class), Text(label)));
-            }
-            self.append(format_args!("</span>"));
-        }
-        let picture = draw(&format!("p{}", self.figures), title);
-        self.append(format_args!("</figcaption>\n<div class=\"picture\">{picture}</div>\n</figure>\n"));
     }
-}
-
-/// Returns a legend sample of a line, a marker or a band as SVG.
-pub(super) fn swatch(class: &str) -> String {
-    let [width, height] = SWATCH;
-    let mut svg = Svg::new(width, height);
-    let middle = [width / 2.0, height / 2.0];
-    let length = width - 2.0;
-    match class.split_once(' ').unwrap_or((class, "")) {
-        ("start" | "dot" | "mark", _) => svg.circle(class, middle, 4.0),
-        ("points", _) => svg.path(class, &Marker::from_class(class).strokes(middle, 1.0)),
-        ("band", kind) => {
-            svg.rectangle(class, [1.0, 0.0], [1.0 + length, height]);
-            svg.horizontal_line(&format!("edge {kind}"), [1.0, 2.0], length);
-        }
-        _ => svg.horizontal_line(class, [1.0, height / 2.0], length),
-    }
-    svg.into_swatch()
 }

@@ -2,10 +2,9 @@
 //!
 //! [`Report`] compares one or several runs ([`runs::SimulationPage`] fills it), [`IdentificationPage`] documents the identification of an axis,
 //! and [`Document`] is a page of any text, tables and [`Chart`]s. A page is one self-contained file: it
-//! includes its style sheet and its plots (SVG), has no script, and loads nothing. Colors follow the light,
-//! dark or print theme; lines differ by dash pattern as well. Equal input gives equal bytes. Signals are
-//! decimated to the resolution of the plot and keep their peaks, so that the size of a page is independent of
-//! the run length.
+//! includes its style sheet, its data as JSON and plotly.js, which plots them (`page.js`), and loads nothing. Colors
+//! follow the light, dark or print theme; lines differ by dash pattern as well. Equal input gives equal bytes.
+//! Signals are decimated and keep their peaks, so that a page has at most 8 MB at any run length.
 //!
 //! ```
 //! use virtual_axes_report::{Chart, ChartAxis, ChartSeries, DisplayUnit, Document, Panel, Section, SeriesStyle};
@@ -28,35 +27,26 @@
 
 mod axes;
 mod chart;
-mod chart_draw;
 mod decimate;
 mod document;
+mod extent;
+mod figure_json;
 mod html;
-mod identification;
-mod limits;
-mod markers;
-mod page;
-mod path_plot;
-mod plot_area;
-mod polar;
+pub mod identification;
 mod report;
-mod report_page;
 pub mod runs;
-mod scale;
-mod scatter;
-mod shade;
-mod strip;
-mod svg;
 mod table;
 mod text;
-mod time_plot;
-mod tool;
+mod tool_path;
 mod unit;
 
-pub use chart::{AxisRange, Band, BandClass, Chart, ChartAxis, ChartSeries, Guide, Panel, SeriesStyle};
+pub use axes::ReportRun;
+pub use chart::{
+    AxisRange, Band, BandClass, Chart, ChartAxis, ChartForm, ChartSeries, Guide, Panel, SeriesStyle,
+};
 pub use document::{Document, Notice, NoticeLevel, Section};
-pub use identification::{IdentificationPage, ValidationRecording};
-pub use report::{Report, ReportRun};
-pub use scatter::{PointGroup, PointStyle, Scatter};
+pub use identification::{IdentificationPage, identification_document};
+pub use report::Report;
 pub use table::{Table, TableColumn};
+pub use tool_path::{RunPath, ToolPath};
 pub use unit::DisplayUnit;

@@ -52,6 +52,23 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
     text
 }
 
+/// Text of a number that is missing.
+pub(super) const NONE: &str = "–";
+
+/// Formats a number with `count` significant digits; a dash if it is not finite.
+pub(super) fn digits(value: f64, count: i32) -> String {
+    /// Decimal exponents of numbers that are written without an exponent.
+    const PLAIN: std::ops::Range<i32> = -5..7;
+    if !value.is_finite() {
+        return NONE.to_owned();
+    }
+    let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+    if !PLAIN.contains(&magnitude) {
+        return format!("{value:.*e}", usize::try_from(count - 1).unwrap_or(0));
+    }
+    format!("{value:.*}", usize::try_from(count - 1 - magnitude).unwrap_or(0))
+}
+
 /// Formats a number with about three significant digits.
 pub(super) fn rounded(value: f64) -> String {
     let decimals = match value.abs() {
@@ -91,6 +108,11 @@ pub(super) fn capital(text: &str) -> String {
     rest.next().map_or(String::new(), |first| first.to_uppercase().chain(rest).collect())
 }
 
+/// Returns a joint name in the notation of machine axes: a single letter becomes a capital.
+pub(super) fn axis_name(name: &str) -> String {
+    if name.chars().count() == 1 { capital(name) } else { name.to_owned() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -113,6 +135,16 @@ mod tests {
         assert_eq!(cell("-12.5"), "−12.5");
         assert_eq!(cell("-Z"), "-Z");
         assert!(is_number("−1\u{202f}000.5") && !is_number("X") && !is_number(""));
+    }
+
+    #[test]
+    fn numbers_keep_their_digits() {
+        assert_eq!(digits(0.028_04, 4), "0.02804");
+        assert_eq!(digits(-95.113, 4), "-95.11");
+        assert_eq!(digits(12_345.6, 3), "12346");
+        assert_eq!(digits(1.234e-6, 3), "1.23e-6");
+        assert_eq!(digits(f64::NAN, 3), NONE);
+        assert_eq!(digits(0.0, 3), "0.00");
     }
 
     #[test]

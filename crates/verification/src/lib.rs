@@ -3,8 +3,7 @@
 //!
 //! - [`stress`] runs random trajectories and checks limits, friction, energy balance and following errors at every tick.
 //! - [`production_traces`] generates recordings of hidden axes in production.
-//! - [`presliding_study`] identifies the presliding of random axes.
-//! - [`transmission_study`] identifies the transmission of random axes.
+//! - [`random`] has the random numbers of both, bit-identical on every processor.
 //! - [`fixtures`] contains test machines, recordings, tuning problems and temporary folders.
 //!
 //! The crate is a development dependency only and is not published.
@@ -15,7 +14,7 @@
 //! use virtual_axes_core::machine::SimdWidth;
 //! use virtual_axes_verification::stress::{TestMachines, TrajectoryTest};
 //!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
 //! // Trajectory 12 of seed 7 on the default machine with each kind of controller.
 //! let machines = TestMachines::new(&[Parameters::embedded_default()?])?;
 //! let mut test = TrajectoryTest::new(&machines, 7, SimdWidth::Widest);
@@ -27,19 +26,22 @@
 
 #![forbid(unsafe_code)]
 
-use std::ops::Range;
-
 pub mod fixtures;
-pub mod presliding_study;
 pub mod production_traces;
+pub mod random;
 pub mod stress;
-pub mod transmission_study;
 
-/// Parses the seeds of a study, `5000..5200`.
-///
-/// # Errors
-/// Returns the text of the error for anything but a range that is not empty.
-pub fn parse_seeds(text: &str) -> Result<Range<u64>, String> {
-    let parsed = text.split_once("..").and_then(|(from, to)| Some(from.parse().ok()?..to.parse().ok()?));
-    parsed.filter(|seeds| !seeds.is_empty()).ok_or_else(|| format!("{text} is no range such as 5000..5200"))
+use std::fmt::Display;
+use std::process::ExitCode;
+
+/// Prints the text of a developer's program, or its error; returns the exit status, 2 after an error.
+pub fn print_result(result: Result<String, impl Display>) -> ExitCode {
+    match result {
+        Ok(text) => print!("{text}"),
+        Err(error) => {
+            eprintln!("{error}");
+            return ExitCode::from(2);
+        }
+    }
+    ExitCode::SUCCESS
 }

@@ -4,55 +4,25 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
 
-mod axis;
+mod arguments;
 mod bode;
-mod bode_output;
-mod bode_report;
-mod campaign;
+// A module, not a dependency, which would recompile the library of this package with each new scenario.
+#[path = "../../../crates/builtin/src/lib.rs"]
+mod builtin;
 mod check;
 mod design;
-mod design_output;
-mod fmu;
+mod export;
 mod identify;
-mod identify_axes;
-mod identify_columns;
-mod identify_result;
-mod identify_text;
 mod input;
-mod interface;
-mod interrupt;
-mod json;
 mod learn;
-mod learn_output;
-mod limit_audit;
-mod limit_audit_output;
 mod list;
-mod machine_file;
-mod output_arguments;
-mod parameters;
-mod part_program;
-mod part_program_arguments;
-mod period;
+mod output;
 mod pose;
-mod program_text;
-mod progress;
 mod psec;
-mod recordings;
-mod report;
-mod robustness;
-mod row_audit;
 mod run;
-mod search;
-mod setpoint_summary;
-mod text_table;
-mod trial_arguments;
 mod tune;
-mod tune_output;
-mod urdf;
-mod variant;
 
 use std::error::Error;
-use std::fmt::Display;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
@@ -60,7 +30,9 @@ use clap::error::ContextKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use virtual_axes_core::config::listing;
-use virtual_axes_core::text::{escaped_lines, is_control};
+use virtual_axes_core::text::is_control;
+
+use crate::output::{interrupt, print_error};
 
 /// Exit status of `check` if setpoints are beyond a limit.
 const BEYOND_LIMITS: u8 = 1;
@@ -92,15 +64,15 @@ enum Command {
     /// Learn setpoints that compensate the repeatable errors of a motion, run after run.
     Learn(Box<learn::LearnArguments>),
     /// Simulate one tuning on plants with deviating inertia, friction and torque constant.
-    Robustness(Box<robustness::RobustnessArguments>),
+    Robustness(Box<tune::robustness::RobustnessArguments>),
     /// Identify the parameters of an axis from recordings and write a machine file.
     Identify(Box<identify::IdentifyArguments>),
     /// Validate a machine file, a scenario, setpoints, or a part program, and compare setpoints with the limits.
     Check(check::CheckArguments),
     /// Print the URDF of a machine, for robot_state_publisher and RViz.
-    Urdf(urdf::UrdfArguments),
+    Urdf(export::UrdfArguments),
     /// Write a machine as an FMU (FMI 2.0 co-simulation), for Simulink, OpenModelica and other importers.
-    Fmu(fmu::FmuArguments),
+    Fmu(export::FmuArguments),
     /// Print the tool pose in the workpiece frame for joint positions (forward kinematics).
     Pose(pose::PoseArguments),
     /// List the built-in machines.
@@ -109,7 +81,7 @@ enum Command {
         #[arg(long)]
         json: bool,
         /// Print the file of this machine or scenario, as a template.
-        #[arg(long, value_name = "MACHINE", conflicts_with = "json")]
+        #[arg(long, visible_alias = "new", value_name = "MACHINE", conflicts_with = "json")]
         show: Option<String>,
     },
     /// List the built-in scenarios and part programs.
@@ -148,13 +120,13 @@ fn main() -> ExitCode {
     let text = match run_command(&command_line().command) {
         Ok(text) => text,
         Err(error) => {
-            if let Some(invalid) = error.downcast_ref::<identify_result::InvalidResult>() {
+            if let Some(invalid) = error.downcast_ref::<identify::invalid_result::InvalidResult>() {
                 // The results are shown, with the reason why they must not be used.
                 let _ = io::stdout().write_all(invalid.text.as_bytes());
                 print_error(invalid);
                 return ExitCode::from(INVALID_RESULT);
             }
-            if let Some(excess) = error.downcast_ref::<limit_audit::LimitExcess>() {
+            if let Some(excess) = error.downcast_ref::<check::limit_audit::LimitExcess>() {
                 let _ = io::stdout().write_all(excess.text.as_bytes());
                 print_error(excess);
                 return ExitCode::from(BEYOND_LIMITS);
@@ -189,11 +161,6 @@ fn command_line() -> CommandLine {
     })
 }
 
-/// Prints an error with escaped control characters; a failure of standard error is ignored.
-fn print_error(error: &(impl Display + ?Sized)) {
-    let _ = writeln!(io::stderr(), "{}", escaped_lines(&error.to_string()));
-}
-
 /// Runs a command and returns its output.
 fn run_command(command: &Command) -> Result<String, Box<dyn Error>> {
     match command {
@@ -203,21 +170,21 @@ fn run_command(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Bode(arguments) => bode::run(arguments),
         Command::Tune(arguments) => tune::run(arguments),
         Command::Learn(arguments) => learn::run(arguments),
-        Command::Robustness(arguments) => robustness::run(arguments),
+        Command::Robustness(arguments) => tune::robustness::run(arguments),
         Command::Identify(arguments) => identify::run(arguments),
         Command::Check(arguments) => check::run(arguments),
-        Command::Urdf(arguments) => urdf::run(arguments),
-        Command::Fmu(arguments) => fmu::run(arguments),
+        Command::Urdf(arguments) => export::write_urdf(arguments),
+        Command::Fmu(arguments) => export::write_fmu(arguments),
         Command::Pose(arguments) => pose::run(arguments),
         Command::Machines { show: Some(name), .. } => list::machine(name),
         Command::Machines { json, show: None } => list::machines(*json),
         Command::Scenarios { show: Some(name), .. } => list::scenario(name),
         Command::Scenarios { json, show: None } => list::scenarios(*json),
         Command::Parameters { markdown: true, .. } => Ok(listing::markdown()),
-        Command::Parameters { json: true, .. } => Ok(parameters::json()),
+        Command::Parameters { json: true, .. } => Ok(list::parameters()),
         Command::Parameters { .. } => Ok(listing::text()),
-        Command::Interface { json: true } => Ok(interface::json()),
-        Command::Interface { json: false } => Ok(interface::text()),
+        Command::Interface { json: true } => Ok(list::interface::json()),
+        Command::Interface { json: false } => Ok(list::interface::text()),
         Command::Completions { shell } => {
             let mut text = Vec::new();
             let name = CommandLine::command().get_name().to_owned();

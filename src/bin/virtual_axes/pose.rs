@@ -6,7 +6,7 @@ use serde_json::json;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::kinematics::Kinematics;
 
-use crate::trial_arguments::MachineArguments;
+use crate::arguments::trial_arguments::MachineArguments;
 
 /// Largest position, m or rad. Larger positions have no micrometer resolution in f64 arithmetic.
 const MAX_POSITION: f64 = 1e6;

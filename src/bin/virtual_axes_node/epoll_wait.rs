@@ -1,10 +1,16 @@
-//! Replacement of `epoll_wait` that returns no events instead of EINTR, and that delays discovery while the node starts
-//! ([`discovery_gate`]).
+//! Replacement of `epoll_wait` that returns no events instead of EINTR, and that delays discovery while the node starts.
 //!
-//! Linux interrupts `epoll_wait` when a stopped process continues (signal(7)): after Ctrl-Z and `fg`, SIGSTOP and
-//! SIGCONT, a debugger, a frozen container, or the suspend of a laptop. Threads of the middleware (RustDDS 0.15.1,
-//! `dp_event_loop` and `discovery`) treat EINTR as a fatal error and end. The node would continue without any
-//! communication. The linker prefers the `epoll_wait` of the program to that of the C library.
+//! **Symptom:** a node that was stopped and continues (Ctrl-Z and `fg`, SIGSTOP and SIGCONT, a debugger, a frozen container,
+//! the suspend of a laptop) does not communicate any more: Linux interrupts `epoll_wait` then (signal(7)).
+//!
+//! **Upstream:** RustDDS 0.15.1, `src/rtps/dp_event_loop.rs` line 306 and `src/discovery/discovery.rs` line 734: the threads end
+//! at any error of `poll`.
+//!
+//! **Test:** `test_py/test_faults_process.py`.
+//!
+//! **Superfluous when** RustDDS repeats an interrupted `poll`, and the gate of `virtual_axes_dds` is.
+//!
+//! The linker prefers the `epoll_wait` of the program to that of the C library.
 #![allow(unsafe_code)]
 
 use std::ffi::c_int;
@@ -12,7 +18,7 @@ use std::io::{Error, ErrorKind};
 use std::ptr;
 
 use libc::epoll_event;
-use virtual_axes::ros::discovery_gate;
+use virtual_axes_dds::pass_discovery_gate;
 
 /// Size of the kernel's signal set, bytes.
 const SIGNAL_SET_BYTES: usize = 8;
@@ -29,7 +35,7 @@ unsafe extern "C" fn epoll_wait(
     max_events: c_int,
     timeout_ms: c_int,
 ) -> c_int {
-    if !discovery_gate::pass() {
+    if !pass_discovery_gate() {
         return 0;
     }
     let no_mask = ptr::null::<libc::sigset_t>();

@@ -2,6 +2,10 @@
 
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
 
+// A module, not a dependency, which would recompile the library of this package with each new scenario.
+#[path = "../../../crates/builtin/src/lib.rs"]
+#[allow(dead_code)]
+mod builtin;
 #[cfg(target_os = "linux")]
 mod epoll_wait;
 
@@ -9,12 +13,10 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
 
-use virtual_axes::ingress::args::{ArgsError, Command, ParameterSource, RosArgs};
-use virtual_axes::ros::environment::Environment;
-use virtual_axes::ros::node;
-use virtual_axes::ros::security::Security;
-use virtual_axes::ros::{log, rosout};
+use virtual_axes::ros::{ROSOUT_QUEUE, log, node};
+use virtual_axes::validation::args::{ArgsError, Command, ParameterSource, RosArgs};
 use virtual_axes_core::config::{Parameters, ValueSource, parse_assignment};
+use virtual_axes_dds::{Environment, Security};
 
 /// Global allocator.
 ///
@@ -87,7 +89,7 @@ fn run(args: &RosArgs) -> ExitCode {
         Ok(security) => security,
         Err(error) => return fail(&error),
     };
-    let (records_in, records) = tokio::sync::mpsc::channel(rosout::QUEUE);
+    let (records_in, records) = tokio::sync::mpsc::channel(ROSOUT_QUEUE);
     let log = match log::init(args, Some(records_in)) {
         Ok(log) => log,
         Err(error) => return fail(&error),
@@ -97,13 +99,16 @@ fn run(args: &RosArgs) -> ExitCode {
     }
     let read = || parameters(args).map_err(|error| error.to_string());
     let (status, error) = match parameters(args) {
-        Ok(parameters) => match node::run(args, &environment, &security, &read, parameters, records) {
-            Ok(()) => (ExitCode::SUCCESS, None),
-            Err(error) => {
-                let status = if error.is_usage() { ExitCode::from(USAGE_ERROR) } else { ExitCode::FAILURE };
-                (status, Some(error.to_string()))
+        Ok(parameters) => {
+            match node::run(args, &environment, &security, &read, parameters, builtin::PROGRAMS, records) {
+                Ok(()) => (ExitCode::SUCCESS, None),
+                Err(error) => {
+                    let status =
+                        if error.is_usage() { ExitCode::from(USAGE_ERROR) } else { ExitCode::FAILURE };
+                    (status, Some(error.to_string()))
+                }
             }
-        },
+        }
         Err(error) => (ExitCode::from(USAGE_ERROR), Some(error.to_string())),
     };
     log.finish(error.map(|text| error_line(&text)));
@@ -120,19 +125,30 @@ fn parameters(args: &RosArgs) -> Result<Parameters, Box<dyn std::error::Error>> 
     for source in args.parameters() {
         match source {
             ParameterSource::Value { name, text, .. } => {
-                if name == "machine" && Parameters::names_machine(text) {
+                if name == "machine" && Parameters::names_machine(text, builtin::MACHINES) {
                     tracing::warn!(
                         "-p machine:={text} sets the name only and changes no drive; to simulate another machine, \
                          pass its file with --params-file (`virtual_axes machines --show NAME` prints a built-in one)"
                     );
                 }
-                pending.push(parse_assignment(&format!("{name}:={text}"), &ValueSource::named("-p"))?);
+                let assignment = parse_assignment(&format!("{name}:={text}"), &ValueSource::named("-p"))?;
+                match parameters.ignored(&assignment) {
+                    Some(reason) => tracing::warn!("{reason}; ignored"),
+                    None => pending.push(assignment),
+                }
             }
             ParameterSource::File(path) => {
                 parameters.set_all(std::mem::take(&mut pending))?;
                 let overlay = parameters.overlay_file(path, Some(&node))?;
+                for reason in overlay.ignored {
+                    tracing::warn!("{reason}; ignored");
+                }
                 if overlay.sections == 0 {
-                    tracing::warn!("{} contains no parameters for {node}", path.display());
+                    tracing::warn!(
+                        "{} contains no parameters for {node}, only for {}; -r __node:=NAME changes the name of the node",
+                        path.display(),
+                        overlay.skipped.join(", ")
+                    );
                 }
             }
         }

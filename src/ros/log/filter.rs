@@ -3,10 +3,11 @@
 use tracing::{Event, Metadata, Subscriber, level_filters::LevelFilter, subscriber::Interest};
 use tracing_subscriber::layer::{Context, Filter};
 
-use super::{super::args::LogLevel, EventText};
+use super::event_text::EventText;
+use crate::validation::args::LogLevel;
 
 /// Crates of this program: library and node.
-const OWN: [&str; 2] = ["virtual_axes", "virtual_axes_node"];
+const OWN: [&str; 3] = ["virtual_axes", "virtual_axes_dds", "virtual_axes_node"];
 
 /// Default levels of other crates.
 const DEFAULTS: [(&str, LevelFilter); 3] = [
@@ -141,6 +142,7 @@ mod tests {
         for (target, level) in [
             ("virtual_axes", LevelFilter::ERROR),
             ("virtual_axes::ros::log", LevelFilter::ERROR),
+            ("virtual_axes_dds::discovery", LevelFilter::ERROR),
             ("virtual_axes_node", LevelFilter::ERROR),
             ("virtual_axes_other", LevelFilter::WARN),
             ("rustdds::rtps::writer", LevelFilter::DEBUG),

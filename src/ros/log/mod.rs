@@ -10,30 +10,26 @@
 //!
 //! Except for debug messages, at most 50 lines of one kind are shown per second.
 
+mod event_text;
 mod filter;
 mod rate_limit;
 mod terminal;
 
-use std::{
-    fmt::{self, Write as _},
-    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
-};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use tokio::sync::mpsc;
-use tracing::{
-    Event, Level, Subscriber,
-    field::{Field, Visit},
-};
+use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::{
     layer::{Context, Layer, SubscriberExt},
     registry::LookupSpan,
     util::{SubscriberInitExt, TryInitError},
 };
 
+use self::event_text::EventText;
 use self::filter::LoggerLevels;
 use self::rate_limit::{LineRateLimiter, RateDecision};
 use self::terminal::Terminal;
-use super::args::{LogLevel, RosArgs};
+use crate::validation::args::{LogLevel, RosArgs};
 use virtual_axes_core::text::is_control;
 
 /// Longest time for which the end of the program waits for a slow reader of stderr.
@@ -199,48 +195,6 @@ fn terminal_line(record: &LogRecord) -> String {
     }
     line.push('\n');
     line
-}
-
-/// Fields of an event as text: the message, then `name=value` for the others.
-#[derive(Default)]
-struct EventText {
-    message: String,
-    fields: String,
-    log_target: Option<String>,
-}
-
-impl EventText {
-    fn from_event(event: &Event<'_>) -> Self {
-        let mut text = Self::default();
-        event.record(&mut text);
-        let fields = std::mem::take(&mut text.fields);
-        text.message.push_str(&fields);
-        text
-    }
-
-    /// Returns the target of an event. Records of `log` contain it in a field.
-    fn target<'a>(&'a self, event: &Event<'a>) -> &'a str {
-        self.log_target.as_deref().unwrap_or_else(|| event.metadata().target())
-    }
-}
-
-impl Visit for EventText {
-    fn record_str(&mut self, field: &Field, value: &str) {
-        match field.name() {
-            "log.target" => self.log_target = Some(value.to_owned()),
-            "message" => self.message.push_str(value),
-            _ => self.record_debug(field, &value),
-        }
-    }
-
-    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
-        // Writing to a String does not fail.
-        let _ = match field.name() {
-            "message" => write!(self.message, "{value:?}"),
-            name if name.starts_with("log.") => Ok(()),
-            name => write!(self.fields, " {name}={value:?}"),
-        };
-    }
 }
 
 #[cfg(test)]

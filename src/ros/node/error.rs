@@ -1,11 +1,10 @@
 //! Errors that prevent the node from starting.
 
-use crate::ros::endpoints::EndpointError;
-use crate::ros::participant::ParticipantError;
-use crate::ros::recorder::RecordError;
-use crate::ros::service::{ServiceError, ServiceNameConflict};
+use crate::ros::services::{ServiceError, ServiceNameConflict};
+use crate::ros::topics::{EndpointError, RecordError};
 use virtual_axes_core::config::ConfigError;
 use virtual_axes_core::simulation::SimulationError;
+use virtual_axes_dds::ContextError;
 
 /// Failure to start the node.
 #[derive(Debug, thiserror::Error)]
@@ -16,17 +15,9 @@ pub enum NodeError {
     /// The machine cannot be simulated.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// The DDS participant cannot be created.
+    /// The DDS participant or the node cannot be created.
     #[error(transparent)]
-    Participant(#[from] ParticipantError),
-    /// The middleware cannot create the node.
-    #[error("the node {name} cannot be created: {reason}")]
-    Node {
-        /// Fully qualified name of the node.
-        name: String,
-        /// Message of the middleware.
-        reason: String,
-    },
+    Context(#[from] ContextError),
     /// A topic cannot be created.
     #[error(transparent)]
     Endpoint(#[from] EndpointError),

@@ -4,24 +4,22 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use futures::future::Either;
-use ros2_client::Node;
-use ros2_client::service::RmwRequestId;
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::timeout;
 use tracing::{error, info, warn};
 
-use super::NodeError;
+use super::error::NodeError;
 use super::shutdown::ShutdownSignals;
-use crate::ros::args::RosArgs;
-use crate::ros::axes_interface::Command;
-use crate::ros::convert;
-use crate::ros::lifecycle::{LifecycleServer, RequestedTransition, TransitionRequest};
-use crate::ros::parameter_host::UnconfiguredParameterHost;
-use crate::ros::parameter_services::ParameterServices;
-use crate::ros::renewable::EndpointContext;
+use crate::ros::axes::Command;
+use crate::ros::services::{
+    LifecycleServer, ParameterServices, RequestedTransition, TransitionRequest, UnconfiguredParameterHost,
+};
+use crate::validation::args::RosArgs;
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::trajectory::{MotionId, Trajectory};
+use virtual_axes_dds::{Node, RequestId};
+use virtual_axes_io::messages::stamp;
 
 /// Longest duration of a deactivation; a clock that stands still prevents its stop.
 const STOP_TIMEOUT: Duration = Duration::from_secs(10);
@@ -34,7 +32,7 @@ pub(super) enum OperationEnd {
     /// Signal: the process ends.
     Signal,
     /// Transition cleanup by this request: the node starts again, unconfigured.
-    Cleanup(RmwRequestId),
+    Cleanup(RequestId),
 }
 
 /// Lifecycle services and the requested transitions.
@@ -49,13 +47,8 @@ impl ManagedNode {
     ///
     /// # Errors
     /// [`NodeError`] naming the service that cannot be created.
-    pub(super) fn start(
-        node: &mut Node,
-        context: &EndpointContext,
-        args: &RosArgs,
-        cleanup: Option<RmwRequestId>,
-    ) -> Result<Self, NodeError> {
-        let lifecycle = LifecycleServer::new(node, context, args)?;
+    pub(super) fn start(node: &Node, args: &RosArgs, cleanup: Option<RequestId>) -> Result<Self, NodeError> {
+        let lifecycle = LifecycleServer::new(node, args)?;
         let (transitions_out, transitions) = mpsc::channel(1);
         let mut server = JoinSet::new();
         server.spawn(lifecycle.serve(transitions_out, cleanup));
@@ -80,7 +73,7 @@ impl ManagedNode {
         info!("unconfigured; waiting for the transition configure");
         loop {
             let (end_serving, is_ended) = oneshot::channel::<()>();
-            let now = || convert::stamp(0);
+            let now = || stamp(0);
             let ended = async { _ = is_ended.await };
             let serving = services.serve(&mut host, now, ended);
             let request = tokio::select! {

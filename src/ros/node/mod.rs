@@ -1,12 +1,11 @@
-//! Node: creation of its endpoints, start of the simulation and the tasks, and ordered shutdown.
+//! Node: start of the simulation and the tasks, and ordered shutdown.
 
-mod endpoints;
 mod error;
 mod managed;
-mod outputs;
 mod requests;
 mod setup;
 mod shutdown;
+mod start_screen;
 mod tasks;
 mod thread;
 
@@ -16,43 +15,27 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
-use futures::FutureExt;
-use ros2_client::service::RmwRequestId;
-use tokio::sync::{Mutex, mpsc, oneshot, watch};
+use tokio::sync::{Mutex, mpsc, watch};
 use tokio::task::JoinSet;
 
-use super::args::RosArgs;
-use super::axes_interface::Command;
-use super::clock::ClockState;
-use super::discovery_gate::ClosedGate;
-use super::environment::Environment;
-use super::health::Health;
-use super::inputs::next_motion_id;
+use super::axes::{Health, MotionIds};
 use super::log::LogRecord;
-use super::own_participants::OwnParticipants;
-use super::parameter_host::LiveNodeParameters;
-use super::parameter_services::ParameterServices;
-use super::participant::Participant;
-use super::participant::create_node;
-use super::recorder::{TopicRecorder, TopicRecording};
-use super::renewable::EndpointContext;
-use super::renewal::DiscoveryWatch;
-use super::security::Security;
-use super::service;
-use super::static_peers;
-use super::topics::Topics;
-use crate::interface::{LIFECYCLE_SERVICES, SERVICES};
-use endpoints::NodeEndpoints;
+use super::publication::{Rosout, publish_diagnostics};
+use super::services::{ParameterServices, check_names};
+use super::topics::{OverflowPolicy, TopicFactory, TopicRecording};
+use crate::ros_interface::{DIAGNOSTICS, LIFECYCLE_SERVICES, SERVICES};
+use crate::validation::args::RosArgs;
 use managed::{ManagedNode, OperationEnd};
-use outputs::{NodeOutputs, NodePublishers, start_outputs};
 use setup::NodeSetup;
 use shutdown::{ShutdownSequence, ShutdownSignals};
-use tasks::NodeTasks;
+use tasks::{NodeTasks, create_results};
 use thread::{AxesThread, AxesThreadEnds};
-use virtual_axes_core::config::{Parameters, TimeMode};
+use virtual_axes_core::config::Parameters;
+use virtual_axes_core::text::BuiltinFiles;
+use virtual_axes_dds::{ClosedGate, Context, Environment, RequestId, Security};
 
 /// Runs the node until SIGINT, SIGTERM or SIGHUP; the records of `log` are published on `/rosout`. `read` reads the
-/// parameters again, at each configuration of a managed node.
+/// parameters again, at each configuration of a managed node; `builtin` are the built-in part programs.
 ///
 /// # Errors
 /// [`NodeError`] if the node cannot start; its endpoints are removed from the network then.
@@ -62,6 +45,7 @@ pub fn run(
     security: &Security,
     read: &(dyn Fn() -> Result<Parameters, String> + Sync),
     parameters: Parameters,
+    builtin: &'static BuiltinFiles,
     log: mpsc::Receiver<LogRecord>,
 ) -> Result<(), NodeError> {
     // With two workers, the second would be woken with the first each time without work to do.
@@ -76,24 +60,24 @@ pub fn run(
         ShutdownSignals::new()?
     };
     let mut cleanup = None;
-    let (participants, result) = loop {
+    let (context, result) = loop {
         let gate = ClosedGate::new();
-        let participants = OwnParticipants::new(Participant::open_with(environment, security)?);
+        let context = Context::open(environment, security)?;
         let (start, log) = (parameters.clone(), Arc::clone(&log));
-        let begin = Begin { parameters: start, gate, cleanup };
-        let result = runtime.block_on(serve(args, &participants, begin, read, &mut signals, log));
+        let begin = Begin { parameters: start, builtin, gate, cleanup };
+        let result = runtime.block_on(serve(args, &context, begin, read, &mut signals, log));
         match result {
             Ok(OperationEnd::Cleanup(request)) => {
-                participants.shutdown();
+                context.shutdown();
                 cleanup = Some(request);
             }
-            Ok(OperationEnd::Signal) => break (participants, Ok(())),
-            Err(error) => break (participants, Err(error)),
+            Ok(OperationEnd::Signal) => break (context, Ok(())),
+            Err(error) => break (context, Err(error)),
         }
     };
     // Tasks and endpoints have ended; remaining blocking threads are not waited for.
     runtime.shutdown_timeout(Duration::from_millis(50));
-    participants.shutdown();
+    context.shutdown();
     result
 }
 
@@ -101,38 +85,39 @@ pub fn run(
 struct Begin {
     /// Parameters of the start.
     parameters: Parameters,
+    /// Built-in part programs.
+    builtin: &'static BuiltinFiles,
     /// Gate that opens when all endpoints exist.
     gate: ClosedGate,
     /// Request of the cleanup that has ended the operation before.
-    cleanup: Option<RmwRequestId>,
+    cleanup: Option<RequestId>,
 }
 
 /// Creates the node, runs it until a signal or a cleanup, and shuts it down. Other participants discover it with all
 /// its endpoints, when the gate opens; a managed node with those of its lifecycle and parameters.
 async fn serve(
     args: &RosArgs,
-    participants: &OwnParticipants,
-    Begin { parameters, gate, cleanup }: Begin,
+    context: &Context,
+    Begin { parameters, builtin, gate, cleanup }: Begin,
     read: &(dyn Fn() -> Result<Parameters, String> + Sync),
     signals: &mut ShutdownSignals,
     log: Arc<Mutex<mpsc::Receiver<LogRecord>>>,
 ) -> Result<OperationEnd, NodeError> {
     let lifecycle = if args.is_managed() { LIFECYCLE_SERVICES } else { &[] };
-    service::check_names(args, SERVICES.iter().chain(lifecycle).map(|service| service.label))?;
+    check_names(args, SERVICES.iter().chain(lifecycle).map(|service| service.label))?;
     let (health_out, health) = watch::channel(Health::default());
     let configure = |parameters: Parameters| {
         let setup = NodeSetup::new(&parameters)?;
-        let recorder = TopicRecorder::open(&setup.node_config, setup.overflow, &health)?;
+        let recorder = setup.recorder(&health)?;
         Ok::<_, NodeError>((parameters, setup, recorder))
     };
-    let context = EndpointContext::new(participants.context()?);
-    let mut node = create_node(&context, args)
-        .map_err(|reason| NodeError::Node { name: args.node().to_string(), reason })?;
-    let services = ParameterServices::new(&mut node, &context, args)?;
-    let discovery = DiscoveryWatch::of_first(participants, args, context.domain_participant());
+    let node = context.create_node(args.node().namespace(), args.node().name())?;
+    let mut join_set = JoinSet::new();
+    join_set.spawn(node.spin());
+    let services = ParameterServices::new(&node, args)?;
     let mut gate = Some(gate);
     let (configured, mut managed) = if args.is_managed() {
-        let mut managed = ManagedNode::start(&mut node, &context, args, cleanup)?;
+        let mut managed = ManagedNode::start(&node, args, cleanup)?;
         gate = None;
         match managed.wait_for_configuration(&services, parameters, read, signals, configure).await {
             Some((configured, done)) => (configured, Some((managed, Some(done)))),
@@ -142,80 +127,40 @@ async fn serve(
         (configure(parameters)?, None)
     };
     let (parameters, setup, mut recorder) = configured;
-    let endpoints =
-        NodeEndpoints::create(node, services, &context, args, &parameters, &setup, &mut recorder)?;
-    let NodeEndpoints {
-        node,
-        rosout,
-        topics,
-        tool,
-        action,
-        action_topics,
-        program,
-        program_topics,
-        services,
-    } = endpoints;
-    let Topics { subscriptions, publishers: topics, names } = topics;
 
-    let (axes_thread, AxesThreadEnds { commands, frames, reports }) = AxesThread::new(&setup, health_out)?;
-    let (clock_out, clock) = watch::channel(ClockState::new(setup.mode == TimeMode::Fast));
     let dropped = Arc::new(AtomicU64::new(0));
-    let mut tasks = JoinSet::new();
-    let publishers = NodePublishers {
-        rosout,
-        topics,
-        tool,
-        action_status: action_topics.status,
-        action_feedback: action_topics.feedback,
-        program_status: program_topics.status,
-        program_feedback: program_topics.feedback,
-    };
-    let dds = context.domain_participant();
-    let outputs = start_outputs(publishers, &dds, &setup, &clock, &dropped, &mut tasks);
-    static_peers::announce(participants.clone(), dds.domain_id());
-    // A renewal drops this participant.
-    drop(dds);
-    let NodeOutputs {
-        rosout,
-        fan_out,
-        results,
-        diagnostics,
-        action: action_outputs,
-        program: program_outputs,
-        tracker,
-        rotated,
-    } = outputs;
-    let mut tasks = NodeTasks {
+    let mut topics = TopicFactory::new(&node, args, &parameters, &mut recorder, &dropped, &mut join_set);
+    if let Some(rosout) = Rosout::create(&mut topics, args)? {
+        topics.tasks.spawn(rosout.run(log));
+    }
+    let (axes_thread, AxesThreadEnds { commands, frames, reports }) = AxesThread::new(&setup, health_out)?;
+    let (results, events) = create_results(&mut topics, &setup)?;
+    let tasks = NodeTasks {
         args,
         setup: &setup,
-        participants: participants.clone(),
+        builtin,
         commands,
-        health,
-        results,
-        ids: Arc::new(AtomicU64::new(1)),
-        live: Arc::new(LiveNodeParameters::default()),
-        tasks,
-        parameters: None,
+        health: health.clone(),
+        results: Arc::new(results),
+        ids: MotionIds::default(),
+        live: Arc::default(),
     };
-    tasks.spawn_log_output(rosout, log);
+    let (validator, other_clocks) = (tasks.validator(), Arc::default());
+    let inputs = tasks.start_inputs(&mut topics, &validator)?;
+    let clock = tasks.start_clock_input(&mut topics)?;
+    let (fan_out, actions) = tasks.start_outputs(&mut topics, validator, events, &other_clocks)?;
+    let diagnostics = topics.output(&DIAGNOSTICS, OverflowPolicy::Drop)?;
+    let screen = start_screen::start_screen(args, &topics, setup.config.name(), setup.mode);
+    let served = tasks.start_services(&node, services, parameters.clone(), &mut join_set)?;
     let recording = recorder.start()?;
-    let discovered = tasks.spawn_discovery(discovery, tracker, rotated, node, context);
-    tasks.spawn_clock_input(subscriptions.clock, clock_out);
-    let action = tasks.spawn_trajectory_inputs(action, action_outputs, subscriptions.psec);
-    let program = tasks.spawn_program_server(program, program_outputs);
-    let inputs = tasks.stream_and_load_inputs(subscriptions.psec_stream, subscriptions.load);
-    tasks.spawn_feed_override_input(subscriptions.feed_override);
-    tasks.spawn_services(services, parameters);
-    let recording_status = recording.as_ref().map(TopicRecording::status);
-    tasks.spawn_diagnostics(diagnostics, discovered, dropped, recording_status);
-    tasks.spawn_reports(reports);
-    let pace = tasks.pace(inputs, fan_out.run(frames).boxed(), clock);
-    names.print(args, setup.config.name(), setup.mode);
+    let status = recording.as_ref().map(TopicRecording::status);
+    let text = tasks.diagnostics(&node, other_clocks);
+    join_set.spawn(publish_diagnostics(text, diagnostics, health, dropped, status));
+    join_set.spawn(NodeTasks::publish_reports(Arc::clone(&tasks.results), reports));
+    let pace = tasks.pace(inputs, fan_out, frames, clock, &mut join_set);
+    start_screen::print(&screen);
     if managed.is_some() {
-        // The thread executes it before its first position cycle.
-        let (done, _) = oneshot::channel();
-        let deactivate = Command::Deactivate { id: next_motion_id(&tasks.ids), stop: None, done };
-        _ = tasks.commands.send(deactivate).await;
+        tasks.deactivate().await;
     }
     let thread_ended = axes_thread.spawn(pace)?;
     drop(gate);
@@ -228,10 +173,10 @@ async fn serve(
         Some((managed, done)) => {
             // The receiver is dropped only with its server.
             _ = done.take().map(|done| done.send(true));
-            managed.run(&tasks.commands, tasks.stop(), tasks.parameters.as_ref(), signals).await
+            managed.run(&tasks.commands, tasks.stop(), Some(&served), signals).await
         }
     };
-    let NodeTasks { commands, tasks, .. } = tasks;
-    ShutdownSequence { actions: [action, program], commands, tasks, thread_ended, recording }.run().await;
+    let NodeTasks { commands, .. } = tasks;
+    ShutdownSequence { actions, commands, tasks: join_set, thread_ended, recording }.run().await;
     Ok(end)
 }

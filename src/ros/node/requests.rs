@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tokio::sync::{mpsc, oneshot};
 
-use crate::ros::axes_interface::Command;
+use crate::ros::axes::Command;
 use virtual_axes_core::trajectory::{
     JointLimits, MotionId, Start, Trajectory, TrajectoryRequest, ValidationContext,
 };

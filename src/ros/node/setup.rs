@@ -1,10 +1,15 @@
 //! Settings of the node derived from its parameters.
 
-use crate::ros::overflow::OverflowPolicy;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use tokio::sync::watch;
+
+use crate::ros::axes::Health;
+use crate::ros::topics::{OverflowPolicy, RecordError, TopicRecorder};
 use virtual_axes_core::config::{ConfigError, MachineConfig, NodeConfig, Parameters, TimeMode};
 use virtual_axes_core::simulation;
 use virtual_axes_core::trajectory::JointLimits;
-use virtual_axes_core::units::Nanoseconds;
+use virtual_axes_core::units::{Nanoseconds, seconds};
 
 /// Settings of the node derived from its parameters.
 pub(super) struct NodeSetup {
@@ -39,5 +44,29 @@ impl NodeSetup {
             TimeMode::Fast | TimeMode::SimTime => (OverflowPolicy::Block, OverflowPolicy::Block),
         };
         Ok(NodeSetup { config, node_config, mode, joint_limits, joints, period, overflow, result_overflow })
+    }
+
+    /// Returns the number of position cycles between publications, at least 1.
+    pub(super) fn publication_period(&self) -> i64 {
+        let period = seconds(self.period);
+        self.node_config.publish_rate.map_or(1, |rate| (1.0 / (rate * period)).round() as i64).max(1)
+    }
+
+    /// Creates the recording, with the times of the clock of the node.
+    ///
+    /// # Errors
+    /// [`RecordError`] if the file cannot be created.
+    pub(super) fn recorder(&self, health: &watch::Receiver<Health>) -> Result<TopicRecorder, RecordError> {
+        let (mode, health) = (self.mode, health.clone());
+        let now = move || {
+            let health = health.borrow();
+            let is_before_first_cycle = mode == TimeMode::Fast && health.periods == 0;
+            if mode == TimeMode::Real || is_before_first_cycle {
+                let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+                return u64::try_from(since_epoch.as_nanos()).unwrap_or(u64::MAX);
+            }
+            u64::try_from(health.time).unwrap_or(0)
+        };
+        TopicRecorder::open(&self.node_config, self.overflow != OverflowPolicy::Drop, Box::new(now))
     }
 }

@@ -9,10 +9,10 @@ use tokio::task::JoinSet;
 use tokio::time::timeout;
 use tracing::{info, warn};
 
-use super::NodeError;
-use crate::ros::action::ShutdownHandle;
-use crate::ros::axes_interface::Command;
-use crate::ros::recorder::TopicRecording;
+use super::error::NodeError;
+use crate::ros::actions::ShutdownHandle;
+use crate::ros::axes::Command;
+use crate::ros::topics::TopicRecording;
 
 /// Longest duration of each step of the shutdown.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_millis(300);

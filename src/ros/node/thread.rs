@@ -5,12 +5,12 @@ use std::thread;
 
 use tokio::sync::{mpsc, oneshot, watch};
 
-use super::NodeError;
+use super::error::NodeError;
 use super::setup::NodeSetup;
-use crate::ros::axes_interface::{COMMAND_QUEUE, Command, SampleFrame, SimulationReport};
-use crate::ros::health::Health;
-use crate::ros::outputs::queue_length;
-use crate::ros::pace::{self, AxesChannels, Pace};
+use crate::ros::axes::{
+    self, AxesChannels, COMMAND_QUEUE, Command, Health, Pace, SampleFrame, SimulationReport,
+};
+use crate::ros::topics::queue_length;
 use virtual_axes_core::simulation::{Simulation, SimulationError};
 
 /// Axes' thread before its start.
@@ -35,7 +35,7 @@ impl AxesThread {
         setup: &NodeSetup,
         health: watch::Sender<Health>,
     ) -> Result<(Self, AxesThreadEnds), SimulationError> {
-        let origin = pace::origin(setup.mode, setup.period);
+        let origin = axes::origin(setup.mode, setup.period);
         let simulation = Simulation::new(&setup.config, setup.joint_limits.clone(), origin)?;
         let (commands, commands_in) = mpsc::channel(COMMAND_QUEUE);
         let (frames_out, frames) = mpsc::channel(queue_length(setup.overflow));
@@ -55,7 +55,7 @@ impl AxesThread {
         thread::Builder::new()
             .name("axes".into())
             .spawn(move || {
-                pace::run(simulation, pace, channels);
+                axes::run(simulation, pace, channels);
                 let _ = ended.send(());
             })
             .map_err(|source| NodeError::System { what: "start the axes' thread", source })?;

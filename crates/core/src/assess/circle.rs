@@ -1,17 +1,11 @@
 //! Circularity after ISO 230-4 of simulated points.
 
-use std::f64::consts::{PI, TAU};
-
-use nalgebra::{Matrix3, Vector2, Vector3};
-
-use crate::simd::{LANES, vectorize};
+use crate::simd::{LANES, SliceOperation, vectorize};
 
 mod series;
 
-use series::{GroupAddition, LaneSums, Sector};
+use series::{BINS, LaneSums, Sector, Sums, terms};
 
-/// Number of bins of the polar angle: a tenth of a degree each.
-const BINS: usize = 3600;
 /// Number of sectors, each of which contains a point in a full circle.
 const SECTORS: usize = 36;
 /// Bins on each side of a reversal point in which its spike is sought: 20 degrees.
@@ -209,18 +203,55 @@ pub fn bidirectional(
     })
 }
 
-/// Returns the bin of the polar angle of a point relative to the nominal center.
-fn bin_of(x: f64, y: f64) -> usize {
-    // The conversion to an index truncates; the angle π belongs to the last bin.
-    let bin = ((y.atan2(x) + PI) / TAU * BINS as f64) as usize;
-    bin.min(BINS - 1)
-}
-
 /// A point relative to the nominal center, m.
 #[derive(Debug, Clone, Copy)]
 struct PathPoint {
     offset: [f64; 2],
     deviation: f64,
+}
+
+/// Addition of whole groups of points of a circle.
+struct GroupAddition<'a> {
+    assessor: &'a mut CircleAssessor,
+    xs: &'a [[f64; LANES]],
+    ys: &'a [[f64; LANES]],
+}
+
+impl SliceOperation for GroupAddition<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let GroupAddition { assessor, xs, ys } = self;
+        let ([center_x, center_y], radius) = (assessor.center, assessor.radius);
+        assessor.sums.align();
+        let (mut sums, mut sector) = (assessor.sums.parts, assessor.sector);
+        let [mut least, mut largest] = assessor.range.map(|value| [value; LANES]);
+        for (x, y) in xs.iter().zip(ys) {
+            let (mut x, mut y, mut deviations) = (*x, *y, [0.0; LANES]);
+            for k in 0..LANES {
+                (x[k], y[k]) = (x[k] - center_x, y[k] - center_y);
+                deviations[k] = (x[k] * x[k] + y[k] * y[k]).sqrt() - radius;
+                let terms = terms(x[k] / radius, y[k] / radius, deviations[k] / radius);
+                for (sum, term) in sums.iter_mut().zip(terms) {
+                    sum[k] += term;
+                }
+                least[k] = if deviations[k] < least[k] { deviations[k] } else { least[k] };
+                largest[k] = if deviations[k] > largest[k] { deviations[k] } else { largest[k] };
+            }
+            for k in 0..LANES {
+                if !sector.contains(x[k], y[k]) {
+                    sector = sector.of_next_point(x[k], y[k]);
+                }
+                assessor.bins[sector.bin].add([x[k], y[k]], deviations[k]);
+            }
+        }
+        assessor.sums.parts = sums;
+        assessor.sums.count += xs.len().min(ys.len()) * LANES;
+        assessor.sector = sector;
+        let of_all = |lanes: [f64; LANES], pick: fn(f64, f64) -> f64| lanes.into_iter().fold(lanes[0], pick);
+        assessor.range = [of_all(least, f64::min), of_all(largest, f64::max)];
+    }
 }
 
 /// Innermost and outermost point of a bin.
@@ -273,54 +304,6 @@ impl Range {
 
     fn width(self) -> f64 {
         self.max - self.min
-    }
-}
-
-/// Sums over points (u, v), in units of the radius about the nominal center.
-#[derive(Debug, Clone, Copy)]
-struct Sums {
-    count: f64,
-    /// Sums of u², u v and v².
-    products: Vector3<f64>,
-    /// Sums of u and v.
-    first: Vector2<f64>,
-    /// Sum of (u, v, 1) q.
-    right: Vector3<f64>,
-    /// Sum of q².
-    square: f64,
-    /// Sum of the radial deviation.
-    deviation: f64,
-}
-
-impl Sums {
-    fn plus(&self, other: &Self) -> Self {
-        Self {
-            count: self.count + other.count,
-            products: self.products + other.products,
-            first: self.first + other.first,
-            right: self.right + other.right,
-            square: self.square + other.square,
-            deviation: self.deviation + other.deviation,
-        }
-    }
-
-    /// Returns the sum of (u, v, 1)(u, v, 1)ᵀ.
-    fn normal(&self) -> Matrix3<f64> {
-        let ([uu, uv, vv], [u, v]) = (self.products.into(), self.first.into());
-        Matrix3::new(uu, uv, u, uv, vv, v, u, v, self.count)
-    }
-
-    /// Returns the sums divided by the number of points, `None` without a point.
-    fn means(&self) -> Option<Self> {
-        let n = self.count;
-        (n > 0.0).then(|| Self {
-            count: 1.0,
-            products: self.products / n,
-            first: self.first / n,
-            right: self.right / n,
-            square: self.square / n,
-            deviation: self.deviation / n,
-        })
     }
 }
 

@@ -2,9 +2,7 @@
 
 use nalgebra::{SMatrix, Vector3};
 
-use super::path_shape::{Scratch, pose};
 use crate::kinematics::ToolPose;
-use crate::path::Path;
 
 /// Coefficients of a polynomial.
 const COEFFICIENTS: usize = 8;
@@ -62,17 +60,16 @@ pub(super) fn derivatives(c: &[f64; COEFFICIENTS], x: f64) -> [f64; 3] {
 }
 
 impl CurveCells {
-    /// Creates the cells of a block; `None` for a curve that is not smooth enough.
-    pub fn new(path: &Path, block: usize, scratch: &mut Scratch) -> Option<Self> {
+    /// Creates the cells of a block with knots at arc lengths `knots`; `pose` returns the pose at an arc length. Returns
+    /// `None` for a curve that is not smooth enough.
+    pub fn new(knots: &[f64], mut pose: impl FnMut(f64) -> ToolPose) -> Option<Self> {
         let interpolation = Interpolation::new()?;
         let mut cells = Vec::new();
-        for pair in path.blocks()[block].knots().windows(2) {
+        for pair in knots.windows(2) {
             let mut stack = vec![(pair[0], pair[1], 0)];
             while let Some((from, to, depth)) = stack.pop() {
-                let at = |x: f64, scratch: &mut Scratch| {
-                    pose(path, block, 0.5 * (from + to) + 0.5 * (to - from) * x, scratch)
-                };
-                if let Some(cell) = interpolation.cell([from, to], |x| at(x, scratch)) {
+                let at = |x: f64| pose(0.5 * (from + to) + 0.5 * (to - from) * x);
+                if let Some(cell) = interpolation.cell([from, to], at) {
                     cells.push(cell);
                 } else if depth < MAX_HALVINGS {
                     let middle = 0.5 * (from + to);

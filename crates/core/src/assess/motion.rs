@@ -6,7 +6,7 @@ use crate::statistics::rms_of_sum;
 use crate::units::seconds;
 
 use super::axis::{AxisAssessor, AxisReport};
-use super::contour::{COLUMNS, ContourTracker, FootPoints};
+use super::contour::{ContourTracker, FootPoints};
 
 /// Figures of a motion.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -31,7 +31,7 @@ pub struct MotionAssessor {
     /// Length of the preview of the path beyond the current setpoint, position cycles.
     horizon: u32,
     has_preview: bool,
-    /// Positions of the linear axes at the ticks of a position cycle, m, for at least three axes.
+    /// Positions of the linear axes at the ticks of a position cycle, m; 0 in further columns.
     positions: Vec<Vec<f64>>,
     feet: FootPoints,
     sum_contour_squared: f64,
@@ -49,13 +49,16 @@ impl MotionAssessor {
         let ticks = periods.ticks_per_position() as usize;
         let linear: Vec<usize> =
             indices.iter().copied().filter(|&p| kinds.get(p) == Some(&AxisKind::Linear)).collect();
+        let contour = ContourTracker::new(linear.len());
+        let mut feet = FootPoints::default();
+        feet.resize(ticks);
         MotionAssessor {
             axes: indices.iter().map(|&p| (p, AxisAssessor::default())).collect(),
-            contour: ContourTracker::new(linear.len()),
             horizon,
             has_preview: false,
-            positions: vec![vec![0.0; ticks]; linear.len().max(COLUMNS)],
-            feet: FootPoints::new(ticks),
+            positions: vec![vec![0.0; ticks]; contour.column_count()],
+            contour,
+            feet,
             linear,
             sum_contour_squared: 0.0,
             max_contour: 0.0,
@@ -93,11 +96,7 @@ impl MotionAssessor {
         for (&index, positions) in self.linear.iter().zip(&mut self.positions) {
             machine.positions(index, positions);
         }
-        if let [x, y, z] = &self.positions[..] {
-            self.contour.nearest_all([x, y, z], &mut self.feet);
-        } else {
-            self.contour.nearest_one_by_one(&self.positions, &mut self.feet);
-        }
+        self.contour.nearest(&self.positions, &mut self.feet);
         for square in self.feet.square_distance.iter() {
             let distance = square.sqrt();
             self.max_contour = self.max_contour.max(distance);

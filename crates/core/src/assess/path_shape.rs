@@ -97,7 +97,7 @@ fn curve_point(path: &Path, block: usize, s: f64, turn: bool, scratch: &mut Scra
 
 impl TipCurve {
     pub fn new(path: &Path, block: usize, scratch: &mut Scratch) -> Self {
-        let map = path.has_fixed_tables(block).then(|| linear_map(path, block, scratch));
+        let map = path.has_fixed_rotary_axes(block).then(|| linear_map(path, block, scratch));
         if let Some(shape) = map.and_then(|map| closed_form(path, block, &map, scratch)) {
             return shape;
         }
@@ -105,7 +105,7 @@ impl TipCurve {
         let intervals = intervals(path, block);
         let mut tips = Vec::with_capacity(intervals + 1);
         let mut axes = Vec::with_capacity(intervals + 1);
-        let cells = CurveCells::new(path, block, scratch);
+        let cells = CurveCells::new(&path.blocks()[block].knots(), |s| pose(path, block, s, scratch));
         for i in 0..=intervals {
             let s = length * (i as f64 / intervals as f64);
             let pose = match &cells {
@@ -130,9 +130,9 @@ impl TipCurve {
         !matches!(self, Self::Reorientation { .. } | Self::Fixed)
     }
 
-    /// Returns true if polynomials replace the curve.
-    pub fn has_cells(&self) -> bool {
-        matches!(self, Self::Sampled { cells: Some(_), .. })
+    /// Returns the polynomials that replace the curve.
+    pub fn cells(&self) -> Option<&CurveCells> {
+        if let Self::Sampled { cells, .. } = self { cells.as_ref() } else { None }
     }
 
     /// Returns the tool axis at `s`.
@@ -195,6 +195,11 @@ impl TipCurve {
     /// Returns the point of the evaluated curve at `s`.
     pub fn point(&self, path: &Path, block: usize, s: f64, scratch: &mut Scratch) -> Vector3<f64> {
         match self {
+            Self::Segment { from, slope, .. } => from + slope * s,
+            Self::Circle { center, plane, radius, start, turn, .. } => {
+                let (sine, cosine) = (start + turn * s).sin_cos();
+                center + (plane[0] * cosine + plane[1] * sine) * *radius
+            }
             Self::Sampled { cells: Some(cells), .. } => cells.tip(s),
             _ => curve_point(path, block, s, !self.is_tip_moving(), scratch),
         }
@@ -208,8 +213,11 @@ fn intervals(path: &Path, block: usize) -> usize {
         return SAMPLES_OF_SPLINE;
     }
     let sweep = block.circle().map_or(0.0, |circle| circle.sweep.abs());
-    let tables = [AxisRole::A, AxisRole::C].into_iter().filter_map(|role| path.kinematics().role(role));
-    let turned: f64 = tables.map(|index| (block.end()[index] - block.start()[index]).abs()).sum();
+    let turned: f64 = path
+        .kinematics()
+        .rotary_joints()
+        .map(|index| (block.end()[index] - block.start()[index]).abs())
+        .sum();
     (((sweep + turned) / SAMPLE_ANGLE).ceil() as usize).clamp(2, MAX_SAMPLES)
 }
 
@@ -228,8 +236,8 @@ fn linear_map(path: &Path, block: usize, scratch: &mut Scratch) -> LinearMap {
             // The map is linear; one meter on either side of 0 minimizes rounding.
             let mut tip = |value: f64| {
                 coordinates.fill(0.0);
-                for table in [AxisRole::A, AxisRole::C].into_iter().filter_map(|role| kinematics.role(role)) {
-                    coordinates[table] = start[table];
+                for joint in kinematics.rotary_joints() {
+                    coordinates[joint] = start[joint];
                 }
                 coordinates[index] = value;
                 kinematics.forward(&coordinates).tip
@@ -278,14 +286,7 @@ fn closed_form(path: &Path, block: usize, map: &LinearMap, scratch: &mut Scratch
     Some(TipCurve::Circle { center, plane, radius: circle.radius, start, turn, axis })
 }
 
-/// Returns the parameter of the foot point of `tip` on the line through `from`.
-#[inline(always)]
-pub(super) fn line_parameter(tip: Vector3<f64>, from: Vector3<f64>, slope: Vector3<f64>) -> f64 {
-    slope.dot(&(tip - from)) / slope.norm_squared()
-}
-
 /// Returns the coordinates of a tip in the frame of a circle, and its distance from the circle's axis.
-#[inline(always)]
 pub(super) fn circle_coordinates(
     tip: Vector3<f64>,
     center: Vector3<f64>,
@@ -297,7 +298,6 @@ pub(super) fn circle_coordinates(
 }
 
 /// Returns the distance from a circle of a point at distance `off` from its axis and `z` from its plane.
-#[inline(always)]
 pub(super) fn distance_to_circle(off: f64, z: f64, radius: f64) -> f64 {
     let outside = off - radius;
     (outside * outside + z * z).sqrt()

@@ -1,22 +1,17 @@
 //! Contour error against a geometric path: nearest point on the continuous curve.
 
-mod curve;
-mod follow;
-
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::path_shape::{
-    Scratch, TipCurve, circle_coordinates, distance_to_circle, line_parameter, pose, select_passage,
-};
+use super::deviations::{NearestPoint, PathDeviations};
+use super::feet::{ArcFeet, CellFeet, LineFeet, SampledCurve, largest, line_parameter};
+use super::path_shape::{Scratch, TipCurve, circle_coordinates, distance_to_circle, pose, select_passage};
 use super::tool_angle::{ToolAngles, tool_angle};
-use crate::kinematics::ToolPose;
+use crate::kinematics::{Poses, ToolPose};
 use crate::path::Path;
-
-use follow::FootBuffers;
-pub use follow::{FollowResult, PathDeviations};
+use crate::simd::vectorize;
 
 /// Search range before the furthest nearest point, m or rad, for an axis that moves back.
 const SEARCH_BACK: f64 = 5e-3;
@@ -43,27 +38,13 @@ const QUADRATIC_REACH: f64 = 3e-4;
 /// Smallest denominator of Newton's method, as a fraction of the squared tangent: beyond the radius of
 /// curvature there is no nearest point.
 const MIN_DENOMINATOR: f64 = 0.2;
+/// Largest half angle of an arc on which all poses are evaluated together, rad.
+const MAX_HALF_ANGLE: f64 = 1.5;
+/// Distance that foot points on a curve keep from the ends of the search range, m.
+const CLEARANCE: f64 = 1e-9;
 /// Lever arm that converts an angle to a distance, m. Where the tip is fixed while the tool axis turns, the
 /// orientation selects the nearest point.
 const ORIENTATION_ARM: f64 = 0.1;
-
-/// Point of a path nearest to a tool pose.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NearestPoint {
-    /// Progress along the path ([`Path::length`](crate::path::Path::length)).
-    pub progress: f64,
-    /// Position in the workpiece frame, m.
-    pub point: Vector3<f64>,
-    /// Tool axis of the path at that point.
-    pub axis: Vector3<f64>,
-    /// Contour error: distance of the tool tip from the point, m.
-    pub distance: f64,
-    /// Contour error without overshoot beyond the path's ends, m: distance from the path extended straight
-    /// beyond its first and last point.
-    pub within_ends: f64,
-    /// Orientation error: angle between the tool axes, rad.
-    pub orientation: f64,
-}
 
 /// Part of the path that is searched: block and arc length of both ends.
 #[derive(Debug, Clone, Copy)]
@@ -87,8 +68,9 @@ struct Candidate {
 /// The nearest point is searched from a little before the furthest one so far up to the progress commanded
 /// so far, so that a path that passes the same point twice is followed in order. Lines and circles with
 /// fixed rotary tables are evaluated in closed form; other curves are sampled once and refined by Newton's
-/// method. Where the tip is fixed, the nearest tool axis selects the point. A call does not allocate, and
-/// its cost does not depend on the length of the path.
+/// method. Where the tip is fixed, the nearest tool axis selects the point. The poses of a position cycle are evaluated
+/// together where the search range lies in one smooth block, otherwise one by one. The cost of a call does not depend on
+/// the length of the path.
 #[derive(Debug, Clone)]
 pub struct PathTracker {
     path: Arc<Path>,
@@ -101,29 +83,12 @@ pub struct PathTracker {
     /// Block of the last nearest point.
     block: usize,
     s: f64,
-    /// Last query, if it left the state of the tracker unchanged; an equal query has the same result.
-    last: Option<CachedQuery>,
-    /// Buffers for the foot points of poses.
-    feet: FootBuffers,
+    /// Foot points of poses: arc lengths, or tangents of angles on an arc.
+    feet: Vec<f64>,
+    /// Estimates of the arc lengths.
+    guesses: Vec<f64>,
     angles: ToolAngles,
     scratch: Scratch,
-}
-
-/// A query and its result.
-#[derive(Debug, Clone, Copy)]
-struct CachedQuery {
-    pose: ToolPose,
-    until: f64,
-    nearest: NearestPoint,
-}
-
-impl CachedQuery {
-    fn is_for(&self, pose: &ToolPose, until: f64) -> bool {
-        let bits = |vector: &Vector3<f64>| [vector.x, vector.y, vector.z].map(f64::to_bits);
-        self.until == until
-            && bits(&self.pose.tip) == bits(&pose.tip)
-            && bits(&self.pose.axis) == bits(&pose.axis)
-    }
 }
 
 impl PathTracker {
@@ -143,8 +108,8 @@ impl PathTracker {
             furthest: 0.0,
             block: 0,
             s: 0.0,
-            last: None,
-            feet: FootBuffers::default(),
+            feet: Vec::new(),
+            guesses: Vec::new(),
             angles: ToolAngles::default(),
             scratch,
         }
@@ -155,40 +120,210 @@ impl PathTracker {
         &self.path
     }
 
-    /// Returns the nearest point of the path commanded so far, with progress ≤ `until`. The search starts
-    /// at the last nearest point.
+    /// Returns the largest progress of a nearest point so far.
+    pub fn furthest(&self) -> f64 {
+        self.furthest
+    }
+
+    /// Returns the nearest point to one pose, as [`follow`](Self::follow) does.
     pub fn nearest(&mut self, pose: &ToolPose, until: f64) -> NearestPoint {
-        let until = until.clamp(0.0, self.path.length()).max(self.furthest);
-        if let Some(last) = self.last.filter(|last| last.is_for(pose, until)) {
-            return last.nearest;
+        self.follow_all(&Poses::of(pose), |_| until, &mut PathDeviations::default())
+    }
+
+    /// Computes the deviations of consecutive `poses` and replaces the contents of `found` by them. Returns the nearest
+    /// point to the first pose, `None` without a pose.
+    ///
+    /// `until` returns the progress commanded at the pose of an index; it never decreases. The search starts at the last
+    /// nearest point.
+    pub fn follow(
+        &mut self,
+        poses: &Poses,
+        until: impl FnMut(usize) -> f64,
+        found: &mut PathDeviations,
+    ) -> Option<NearestPoint> {
+        (!poses.is_empty()).then(|| self.follow_all(poses, until, found))
+    }
+
+    fn follow_all(
+        &mut self,
+        poses: &Poses,
+        mut until: impl FnMut(usize) -> f64,
+        found: &mut PathDeviations,
+    ) -> NearestPoint {
+        found.resize(poses.len());
+        let window = self.window(until(poses.len() - 1));
+        if let Some(first) = self.follow_block(poses, window, found) {
+            return first;
         }
-        let before = (self.furthest, self.block, self.s);
-        let best = self.find(pose, until);
+        let first = self.nearest_one(&poses.get(0), until(0));
+        found.fill_from(0, &first);
+        if !poses.is_constant() {
+            for index in 1..poses.len() {
+                found.fill_from(index, &self.nearest_one(&poses.get(index), until(index)));
+            }
+        }
+        first
+    }
+
+    /// Returns the part of the path from a little before the furthest nearest point so far up to the progress `until`.
+    fn window(&self, until: f64) -> SearchWindow {
+        let until = until.clamp(0.0, self.path.length()).max(self.furthest);
+        let from = (self.furthest - SEARCH_BACK).max(0.0);
+        SearchWindow { from: self.path.locate(from), to: self.path.locate(until) }
+    }
+
+    /// Searches the nearest point to a single pose and advances to it.
+    fn nearest_one(&mut self, pose: &ToolPose, until: f64) -> NearestPoint {
+        let best = self.search(pose, self.window(until));
+        if best.s.is_finite() {
+            self.furthest = self.furthest.max(best.progress);
+            (self.block, self.s) = (best.block, best.s);
+        }
         let axis = self.shapes[best.block].axis(&self.path, best.block, best.s, &mut self.scratch);
-        let nearest = NearestPoint {
+        NearestPoint {
             progress: best.progress,
             point: best.point,
             axis,
             distance: best.distance,
             within_ends: self.within_ends(best.progress, pose.tip - best.point, best.distance),
             orientation: tool_angle(&axis, &pose.axis),
-        };
-        let stays = before == (self.furthest, self.block, self.s);
-        self.last = stays.then_some(CachedQuery { pose: *pose, until, nearest });
-        nearest
+        }
     }
 
-    /// Returns the nearest point of [`nearest`](Self::nearest) and advances to it.
-    fn find(&mut self, pose: &ToolPose, until: f64) -> Candidate {
-        let until = until.clamp(0.0, self.path.length()).max(self.furthest);
-        let from = (self.furthest - SEARCH_BACK).max(0.0);
-        let window = SearchWindow { from: self.path.locate(from), to: self.path.locate(until) };
-        let best = self.search(pose, window);
-        if best.s.is_finite() {
-            self.furthest = self.furthest.max(best.progress);
-            (self.block, self.s) = (best.block, best.s);
+    /// Computes the deviations of all poses together if the window lies in one block, a line, an arc of less than half a
+    /// turn or a smooth curve. Returns the nearest point to the first pose and advances to that of the last one; `None`,
+    /// without a change of the tracker, if each pose must be searched.
+    fn follow_block(
+        &mut self,
+        poses: &Poses,
+        window: SearchWindow,
+        found: &mut PathDeviations,
+    ) -> Option<NearestPoint> {
+        let (block, low, high) = (window.from.0, window.from.1, window.to.1.max(window.from.1));
+        if block != window.to.0 {
+            return None;
         }
-        best
+        let shapes = Arc::clone(&self.shapes);
+        self.feet.resize(poses.len(), 0.0);
+        let (feet, distances) = (&mut self.feet[..], &mut found.distance[..]);
+        // Foot points at both ends of the window, and the arc length of a foot point.
+        let mut ends = [low, high];
+        let mut middle = None;
+        match &shapes[block] {
+            TipCurve::Segment { from, slope, .. } => {
+                vectorize(LineFeet {
+                    poses,
+                    from: *from,
+                    slope: *slope,
+                    window: [low, high],
+                    feet,
+                    distances,
+                });
+            }
+            TipCurve::Circle { center, plane: [x, y, z], radius, start, turn, .. } => {
+                let half = 0.5 * (high - low) * turn.abs();
+                if half > MAX_HALF_ANGLE {
+                    return None;
+                }
+                let s = 0.5 * (low + high);
+                let ((sine, cosine), bound) = ((start + turn * s).sin_cos(), half.tan());
+                let frame = [x * cosine + y * sine, (y * cosine - x * sine) * turn.signum(), *z];
+                vectorize(ArcFeet { poses, center: *center, frame, radius: *radius, bound, feet, distances });
+                ends = [-bound, bound];
+                middle = Some((s, turn.abs()));
+            }
+            TipCurve::Sampled { samples, cells: Some(cells), .. } => {
+                let spacing = self.path.blocks()[block].length() / (samples.len() - 1) as f64;
+                let curve = SampledCurve { samples, spacing, cells };
+                self.follow_curve(poses, block, [low, high], curve, found)?;
+            }
+            _ => return None,
+        }
+        let arc_length = |foot: f64| match middle {
+            _ if foot <= ends[0] => low,
+            _ if foot >= ends[1] => high,
+            Some((s, turn)) => s + foot.atan() / turn,
+            None => foot,
+        };
+        let [first, last] = [self.feet[0], self.feet[poses.len() - 1]].map(arc_length);
+        let furthest = arc_length(largest(&self.feet));
+        let shape = &shapes[block];
+        let axis = shape.axis(&self.path, block, first, &mut self.scratch);
+        if shape.cells().is_none() {
+            match poses.constant_axis() {
+                Some(tool) => found.orientation.fill(tool_angle(&axis, &tool)),
+                None => {
+                    let angles = found.orientation.iter_mut().enumerate();
+                    angles.for_each(|(index, angle)| *angle = tool_angle(&axis, &poses.get(index).axis));
+                }
+            }
+        }
+        found.within_ends.copy_from_slice(&found.distance);
+        let start = self.path.start_of(block);
+        let of_window =
+            [(start + low <= 0.0, low, 0.0), (start + high >= self.path.length(), high, start + high)];
+        for (end, (is_end, s, progress)) in of_window.into_iter().enumerate() {
+            if is_end {
+                let point = shape.point(&self.path, block, s, &mut self.scratch);
+                for index in (0..poses.len()).filter(|index| self.feet[*index] == ends[end]) {
+                    found.within_ends[index] =
+                        self.within_ends(progress, poses.tip(index) - point, found.distance[index]);
+                }
+            }
+        }
+        let progress = |s: f64| (start + s).min(self.path.start_of(block + 1));
+        if last.is_finite() {
+            self.furthest = self.furthest.max(progress(furthest));
+            (self.block, self.s) = (block, last);
+        }
+        Some(NearestPoint {
+            progress: progress(first),
+            point: shape.point(&self.path, block, first, &mut self.scratch),
+            axis,
+            distance: found.distance[0],
+            within_ends: found.within_ends[0],
+            orientation: found.orientation[0],
+        })
+    }
+
+    /// Finds the foot points and deviations of all poses on a curve near the last nearest point; `None` if one is not
+    /// found within the window, or if another point of the window could be nearer.
+    fn follow_curve(
+        &mut self,
+        poses: &Poses,
+        block: usize,
+        [low, high]: [f64; 2],
+        curve: SampledCurve<'_>,
+        found: &mut PathDeviations,
+    ) -> Option<()> {
+        let (count, cells) = (poses.len(), curve.cells);
+        let begin = if self.block == block { self.s.clamp(low, high) } else { low };
+        let (point, tangent, _) = cells.tip_derivatives(begin);
+        let slope = tangent / tangent.norm_squared();
+        self.angles.resize(count);
+        self.guesses.resize(count, 0.0);
+        self.feet.fill(f64::NAN);
+        let [xs, ys, zs] = poses.tips();
+        for (guess, ((x, y), z)) in self.guesses.iter_mut().zip(xs.iter().zip(ys).zip(zs)) {
+            *guess = begin + (x - point.x) * slope.x + (y - point.y) * slope.y + (z - point.z) * slope.z;
+        }
+        let ends = [self.guesses[0], self.guesses[count - 1]].map(|s| cells.index_at(s));
+        for cell in &cells.cells()[ends[0].min(ends[1])..=ends[0].max(ends[1])] {
+            let (guesses, feet, angles) = (&self.guesses[..], &mut self.feet[..], &mut self.angles);
+            vectorize(CellFeet { cell, poses, guesses, feet, distances: &mut found.distance, angles });
+        }
+        if self.feet.iter().any(|s| s.is_nan()) {
+            return None;
+        }
+        let least = self.feet.iter().copied().fold(f64::INFINITY, f64::min);
+        let range = [least, largest(&self.feet)];
+        let is_inside = range[0] > low + CLEARANCE && range[1] < high - CLEARANCE;
+        let distance = largest(&found.distance);
+        if !is_inside || !curve.are_nearest(poses, range, distance, [low, high]) {
+            return None;
+        }
+        self.angles.write_angles(&mut found.orientation);
+        Some(())
     }
 
     /// Returns [`NearestPoint::within_ends`] for a nearest point at `progress` with the vector `error` to the tip, m, of
@@ -365,8 +500,10 @@ impl PathTracker {
         let shape = &self.shapes[block];
         let target = if shape.is_tip_moving() { pose.tip } else { pose.axis };
         // The derivatives of polynomials are cheap.
-        let reach =
-            if shape.has_cells() { 0.0 } else { QUADRATIC_REACH * self.path.blocks()[block].length() };
+        let reach = match shape.cells() {
+            Some(_) => 0.0,
+            None => QUADRATIC_REACH * self.path.blocks()[block].length(),
+        };
         let mut s = s.clamp(low, high);
         let mut expansion = (s, shape.local_derivatives(&self.path, block, s, &mut self.scratch));
         let mut point = expansion.1.0;

@@ -5,8 +5,8 @@ use nalgebra::Vector3;
 use crate::kinematics::{Poses, ToolPose};
 use crate::simd::{SliceOperation, vectorize};
 
-use super::contour::{CAPACITY, ContourTracker, FootPoint, FootPoints};
-use super::path_tracker::{NearestPoint, PathDeviations};
+use super::contour::{CAPACITY, ContourTracker, FootPoints};
+use super::deviations::{NearestPoint, PathDeviations};
 use super::tool_angle::{ToolAngles, tool_angle};
 
 /// Length below which two setpoints do not define a direction, m.
@@ -20,6 +20,8 @@ const MIN_STEP: f64 = 1e-12;
 pub struct SetpointTracker {
     contour: ContourTracker,
     poses: Box<[ToolPose]>,
+    /// True for each setpoint that is reached at rapid traverse.
+    rapid: Box<[bool]>,
     /// First and last difference of setpoints of nonzero length, m.
     end_steps: Option<[Vector3<f64>; 2]>,
     /// Buffers of [`follow`](Self::follow).
@@ -33,11 +35,12 @@ impl SetpointTracker {
         let mut tracker = SetpointTracker {
             contour: ContourTracker::new(3),
             poses: vec![start; CAPACITY].into_boxed_slice(),
+            rapid: vec![false; CAPACITY].into_boxed_slice(),
             end_steps: None,
             feet: FootPoints::default(),
             angles: ToolAngles::default(),
         };
-        tracker.push(start);
+        tracker.push(start, false);
         tracker
     }
 
@@ -45,8 +48,8 @@ impl SetpointTracker {
         self.contour.count().saturating_sub(1)
     }
 
-    /// Adds the tool pose of a setpoint.
-    pub fn push(&mut self, pose: ToolPose) {
+    /// Adds the tool pose of a setpoint, which is reached at rapid traverse or at a feed.
+    pub fn push(&mut self, pose: ToolPose, is_rapid: bool) {
         let step = pose.tip - self.poses[ring_index(self.newest())].tip;
         if step.norm_squared() > MIN_STEP * MIN_STEP {
             let first = self.end_steps.map_or(step, |[first, _]| first);
@@ -54,13 +57,24 @@ impl SetpointTracker {
         }
         self.contour.push(pose.tip.iter().copied());
         self.poses[ring_index(self.newest())] = pose;
+        self.rapid[ring_index(self.newest())] = is_rapid;
+    }
+
+    /// Returns true if the tip of `pose` is not that of the newest setpoint.
+    pub fn moves_to(&self, pose: &ToolPose) -> bool {
+        self.poses[ring_index(self.newest())].tip != pose.tip
+    }
+
+    /// Returns true for each pose followed last whose nearest point is reached at rapid traverse.
+    pub fn rapid(&self) -> impl Iterator<Item = bool> + '_ {
+        let newest = self.newest();
+        self.feet.segment.iter().map(move |&k| self.rapid[ring_index((k + 1).min(newest))])
     }
 
     /// Returns the point of the polyline closest to `pose`.
     pub fn nearest(&mut self, pose: &ToolPose) -> NearestPoint {
-        let none = (0, FootPoint { square_distance: 0.0, along: 0.0 });
-        let (k, foot) = self.contour.nearest(pose.tip.as_slice()).unwrap_or(none);
-        self.nearest_at(pose, k, foot)
+        self.contour.nearest(&<[f64; 3]>::from(pose.tip).map(|value| [value]), &mut self.feet);
+        self.nearest_at(pose, 0)
     }
 
     /// Returns the poses at both ends of segment `k`.
@@ -68,14 +82,14 @@ impl SetpointTracker {
         [k, (k + 1).min(self.newest())].map(|k| &self.poses[ring_index(k)])
     }
 
-    /// Returns the foot point `foot` on segment `k` as the nearest point to `pose`.
-    fn nearest_at(&self, pose: &ToolPose, k: u64, foot: FootPoint) -> NearestPoint {
+    /// Returns the foot point of an index as the nearest point to `pose`.
+    fn nearest_at(&self, pose: &ToolPose, index: usize) -> NearestPoint {
+        let (k, along) = (self.feet.segment[index], self.feet.along[index]);
         let [from, to] = self.ends_of(k);
-        let along = foot.along;
         let point = from.tip + along * (to.tip - from.tip);
         let axis = (from.axis + along * (to.axis - from.axis)).normalize();
         let overshoot = self.overshoot(k, along, pose.tip - point);
-        let distance = foot.square_distance.sqrt();
+        let distance = self.feet.square_distance[index].sqrt();
         NearestPoint {
             progress: k as f64 + along,
             point,
@@ -98,18 +112,16 @@ impl SetpointTracker {
         })
     }
 
-    /// Computes the deviations of `poses` as [`nearest`](Self::nearest) does for each of them in order, and
-    /// replaces the contents of `found` by them.
+    /// Computes the deviations of consecutive `poses` and replaces the contents of `found` by them.
     ///
-    /// Returns the nearest point to the first pose, `None` without a pose. Distances are bit-identical to those of
-    /// [`nearest`](Self::nearest), orientations within 10⁻¹⁵ rad.
+    /// Returns the nearest point to the first pose, `None` without a pose.
     pub fn follow(&mut self, poses: &Poses, found: &mut PathDeviations) -> Option<NearestPoint> {
         found.resize(poses.len());
         self.angles.resize(poses.len());
         if poses.is_empty() {
             return None;
         }
-        self.contour.nearest_all(poses.tips(), &mut self.feet);
+        self.contour.nearest(&poses.tips(), &mut self.feet);
         let segments = self.feet.segment.iter();
         let (low, high) =
             segments.fold((u64::MAX, 0), |(low, high), &segment| (low.min(segment), high.max(segment)));
@@ -125,7 +137,7 @@ impl SetpointTracker {
         if low == 0 || self.contour.is_last(high) {
             self.exclude_overshoot(poses, found);
         }
-        Some(self.nearest_at(&poses.get(0), self.feet.segment[0], self.feet.get(0)))
+        Some(self.nearest_at(&poses.get(0), 0))
     }
 
     /// Excludes the overshoot beyond the ends of the path.
@@ -219,10 +231,10 @@ mod tests {
     fn overshoot_beyond_the_last_setpoint_is_reported_separately() {
         let mut tracker = SetpointTracker::new(at(0.0, 0.0));
         for k in 1..=10 {
-            tracker.push(at(0.01 * f64::from(k), 0.0));
+            tracker.push(at(0.01 * f64::from(k), 0.0), false);
         }
         // At rest the end point is repeated.
-        tracker.push(at(0.1, 0.0));
+        tracker.push(at(0.1, 0.0), false);
         let inside = tracker.nearest(&at(0.055, 3e-6));
         assert!((inside.distance - 3e-6).abs() < 1e-15 && (inside.within_ends - 3e-6).abs() < 1e-15);
         let beyond = tracker.nearest(&at(0.1 + 4e-6, 3e-6));
@@ -237,7 +249,7 @@ mod tests {
             axis: Vector3::new(angle.sin(), 0.0, angle.cos()),
         };
         let mut tracker = SetpointTracker::new(tilted(0.0, 0.0));
-        tracker.push(tilted(0.01, 0.02));
+        tracker.push(tilted(0.01, 0.02), false);
         let error = tracker.nearest(&tilted(0.005, 0.01 + 1e-6)).orientation;
         assert!((error - 1e-6).abs() < 1e-11, "{error}");
     }

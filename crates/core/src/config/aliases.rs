@@ -6,62 +6,18 @@
 //! | `constraints.JOINT.goal`, m or rad | `JOINT.tolerances.goal_mm` or `goal_deg` |
 //! | `constraints.goal_time`, s | `goal_time_tolerance` |
 //! | `constraints.stopped_velocity_tolerance`, m/s or rad/s | `stopped_velocity_tolerance` |
-//! | `command_interfaces`, `state_interfaces`, `allow_partial_joints_goal` and others | none: the value must describe this node |
+//!
+//! Those without a parameter are in [`controller`](super::controller).
 
-use super::check::Entries;
+use super::controller;
+use super::declaration::Entries;
+use super::definition::AxisKind;
 use super::error::{ConfigError, ValueSource};
-use super::machine::AxisKind;
 use super::value::Value;
-use crate::text::shortened;
 use crate::units::{DEGREE, MILLIMETER};
 
 /// First part of the aliases.
 const GROUP: &str = "constraints.";
-
-/// Parameter of the controller that this node cannot change: it is accepted with the value that describes this node.
-struct FixedParameter {
-    key: &'static str,
-    describes_node: fn(&Value) -> bool,
-    /// Rule for the value, to follow "must".
-    allowed: &'static str,
-}
-
-/// Fixed parameters of the controller.
-const FIXED: &[FixedParameter] = &[
-    FixedParameter {
-        key: "command_interfaces",
-        describes_node: |value| are_among(value, &["position"]),
-        allowed: "be [position]: setpoints are positions",
-    },
-    FixedParameter {
-        key: "state_interfaces",
-        describes_node: |value| are_among(value, &["position", "velocity"]),
-        allowed: "be [position] or [position, velocity], the states of the axes",
-    },
-    FixedParameter {
-        key: "allow_partial_joints_goal",
-        describes_node: |value| *value == Value::Bool(true),
-        allowed: "be true: axes that a trajectory does not name continue",
-    },
-    FixedParameter {
-        key: "interpolate_from_desired_state",
-        describes_node: |value| *value == Value::Bool(true),
-        allowed: "be true: trajectories begin at the commanded state",
-    },
-    FixedParameter {
-        key: "allow_integration_in_goal_trajectories",
-        describes_node: |value| *value == Value::Bool(false),
-        allowed: "be false: every point of a trajectory has positions",
-    },
-];
-
-/// Returns true if `value` is a list of names, each one of `names`.
-fn are_among(value: &Value, names: &[&str]) -> bool {
-    match value {
-        Value::TextList(list) => !list.is_empty() && list.iter().all(|name| names.contains(&name.as_str())),
-        _ => false,
-    }
-}
 
 /// Parameter that an alias names.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,25 +51,7 @@ impl ParameterAlias {
 
 /// Returns true if `key` has the form of an alias.
 pub(super) fn is_alias(key: &str) -> bool {
-    key.starts_with(GROUP)
-}
-
-/// Returns true if `key` is a fixed parameter of the controller with a value that describes this node.
-///
-/// # Errors
-///
-/// [`ConfigError::NotAllowed`] for another value.
-pub(super) fn describes_node(key: &str, value: &Value, at: &ValueSource) -> Result<bool, ConfigError> {
-    let Some(fixed) = FIXED.iter().find(|fixed| fixed.key == key) else { return Ok(false) };
-    if (fixed.describes_node)(value) {
-        return Ok(true);
-    }
-    Err(ConfigError::NotAllowed {
-        at: at.clone(),
-        key: key.to_owned(),
-        value: value.rounded(),
-        allowed: fixed.allowed.to_owned(),
-    })
+    key.starts_with(GROUP) && controller::find(key).is_none()
 }
 
 /// Returns the parameter that the alias `key` names; `axis` returns the type of the axis of a joint.
@@ -142,32 +80,24 @@ pub(super) fn find(key: &str, axis: impl Fn(&str) -> Option<AxisKind>) -> Option
 ///
 /// # Errors
 ///
-/// [`ConfigError::NotApplicable`] for a name that is no alias or contains an unknown joint, [`ConfigError::WrongType`] and
-/// [`ConfigError::NotAllowed`] for a value that is no number of at least 0.
+/// [`ConfigError`] for a name that is no alias or contains an unknown joint, and for a value that is no number of at least 0.
 pub(super) fn resolve(
     key: &str,
     value: &Value,
     at: &ValueSource,
     entries: &Entries,
 ) -> Result<(String, Value), ConfigError> {
-    let prefix = match entries.get("joint_prefix").map(|entry| &entry.value) {
-        Some(Value::Text(prefix)) => prefix.as_str(),
-        _ => "",
-    };
-    let plain = without_prefix(key, prefix);
+    let plain = without_prefix(key, joint_prefix(entries));
     let axis = |joint: &str| match &entries.get(&format!("{joint}.type"))?.value {
         Value::Text(kind) if kind == "rotary" => Some(AxisKind::Rotary),
         _ => Some(AxisKind::Linear),
     };
     let Some(alias) = find(&plain, axis) else {
-        return Err(ConfigError::NotApplicable {
-            at: at.clone(),
-            key: shortened(key),
-            reason: format!(
-                "use {GROUP}goal_time, {GROUP}stopped_velocity_tolerance, or {GROUP}JOINT.trajectory and \
-                 {GROUP}JOINT.goal with a joint of this machine"
-            ),
-        });
+        let reason = format!(
+            "use {GROUP}goal_time, {GROUP}stopped_velocity_tolerance, or {GROUP}JOINT.trajectory and \
+             {GROUP}JOINT.goal with a joint of this machine"
+        );
+        return Err(ConfigError::not_applicable(at, key, &reason));
     };
     match value {
         Value::Double(number) if !(*number >= 0.0 && number.is_finite()) => {}
@@ -175,21 +105,18 @@ pub(super) fn resolve(
         Value::Double(_) | Value::Integer(_) => {
             return Ok((alias.key.clone(), alias.parameter_value(value.clone())));
         }
-        other => {
-            return Err(ConfigError::WrongType {
-                at: at.clone(),
-                key: shortened(key),
-                found: other.described(),
-                wanted: "number".to_owned(),
-            });
-        }
+        other => return Err(ConfigError::wrong_type(at, key, &other.described(), "number")),
     }
-    Err(ConfigError::NotAllowed {
-        at: at.clone(),
-        key: shortened(key),
-        value: value.rounded(),
-        allowed: format!("be 0 (no tolerance) or a positive number of {}", alias.unit),
-    })
+    let allowed = format!("be 0 (no tolerance) or a positive number of {}", alias.unit);
+    Err(ConfigError::not_allowed(at, key, &value.rounded(), &allowed))
+}
+
+/// Returns the prefix of joint names in messages.
+pub(super) fn joint_prefix(entries: &Entries) -> &str {
+    match entries.get("joint_prefix").map(|entry| &entry.value) {
+        Some(Value::Text(prefix)) => prefix,
+        _ => "",
+    }
 }
 
 /// Returns the alias `key` with its joint name without `prefix`.
@@ -227,7 +154,7 @@ mod tests {
         assert!((number("c.tolerances.goal_deg") - 0.5_f64.to_degrees()).abs() < 1e-12);
         assert_eq!(number("goal_time_tolerance"), 2.0);
         assert!((number("constraints.c.goal") - 0.5).abs() < 1e-15);
-        let defaults = parameters.goal_defaults();
+        let defaults = parameters.node_config().goals;
         assert!((defaults.path[0].expect("set") - 0.002).abs() < 1e-15);
         assert_eq!(defaults.stopped_velocity, Some(0.01));
         assert!(parameters.definition("constraints.c.goal").is_some_and(|definition| definition.is_live));
@@ -299,6 +226,6 @@ mod tests {
             "/**:\n  ros__parameters:\n    constraints:\n      goal_time: 1.5\n      a: {goal: 0.01}\n";
         parameters.overlay_yaml(text, "jtc.yaml", None).expect("valid");
         assert_eq!(parameters.get("constraints.goal_time"), Some(Value::Double(1.5)));
-        assert!(parameters.goal_defaults().goal[3].is_some());
+        assert!(parameters.node_config().goals.goal[3].is_some());
     }
 }

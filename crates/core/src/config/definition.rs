@@ -1,9 +1,7 @@
 //! Definition of a parameter: type, range, default, owner and description, and the check of a value.
 
 use super::error::{ConfigError, ValueSource};
-use super::machine::AxisKind;
 use super::value::{Value, number_text};
-use crate::text::shortened;
 
 /// Type of a parameter and its allowed values.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,6 +83,16 @@ pub enum Scope {
     Node,
 }
 
+crate::named_values! {
+    /// Type of an axis.
+    pub enum AxisKind {
+        /// Linear axis, position in m.
+        Linear = "linear",
+        /// Rotary axis, position in rad.
+        Rotary = "rotary",
+    }
+}
+
 /// Type of the motor of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MotorKind {
@@ -101,6 +109,8 @@ pub struct ParameterDefinition {
     pub key: &'static str,
     /// Unit, empty if dimensionless.
     pub unit: &'static str,
+    /// Value in SI units (times in nanoseconds) of a value of 1.
+    pub(super) si: f64,
     /// Type and range.
     pub kind: ParameterKind,
     /// Required, optional or default.
@@ -179,7 +189,7 @@ impl ParameterDefinition {
     ///
     /// # Errors
     ///
-    /// [`ConfigError::WrongType`] for a value of another type, [`ConfigError::NotAllowed`] for a value out of range.
+    /// [`ConfigError`] for a value of another type or out of range.
     pub(super) fn checked(&self, key: &str, value: &Value, at: &ValueSource) -> Result<Value, ConfigError> {
         let checked = match (self.kind, value) {
             (ParameterKind::Number { min, max }, Value::Double(_) | Value::Integer(_)) => {
@@ -207,20 +217,10 @@ impl ParameterDefinition {
             | (ParameterKind::Text, Value::Text(_))
             | (ParameterKind::TextList, Value::TextList(_)) => Some(value.clone()),
             _ => {
-                return Err(ConfigError::WrongType {
-                    at: at.clone(),
-                    key: shortened(key),
-                    found: value.described(),
-                    wanted: self.expected_type(),
-                });
+                return Err(ConfigError::wrong_type(at, key, &value.described(), &self.expected_type()));
             }
         };
-        checked.ok_or_else(|| ConfigError::NotAllowed {
-            at: at.clone(),
-            key: shortened(key),
-            value: value.rounded(),
-            allowed: self.allowed(),
-        })
+        checked.ok_or_else(|| ConfigError::not_allowed(at, key, &value.rounded(), &self.allowed()))
     }
 
     fn expected_type(&self) -> String {
@@ -237,45 +237,80 @@ impl ParameterDefinition {
     }
 }
 
-/// Builder methods for the constant schema table; each changes one property.
+/// Defines a required parameter.
+const fn parameter(key: &'static str, unit: &'static str, kind: ParameterKind) -> ParameterDefinition {
+    ParameterDefinition {
+        key,
+        unit,
+        si: 1.0,
+        kind,
+        presence: Presence::Required,
+        is_live: false,
+        scope: Scope::Machine,
+        axis: None,
+        motor: None,
+        description: "",
+    }
+}
+
+/// Defines a number in the closed range `min..=max`.
+pub(super) const fn number(key: &'static str, unit: &'static str, min: f64, max: f64) -> ParameterDefinition {
+    parameter(key, unit, ParameterKind::Number { min, max })
+}
+
+/// Defines a list of 1 to `max_len` numbers.
+pub(super) const fn numbers(key: &'static str, unit: &'static str, max_len: usize) -> ParameterDefinition {
+    parameter(key, unit, ParameterKind::NumberList { min_len: 1, max_len })
+}
+
+/// Defines an integer in the closed range `min..=max`.
+pub(super) const fn integer(
+    key: &'static str,
+    unit: &'static str,
+    min: i64,
+    max: i64,
+) -> ParameterDefinition {
+    parameter(key, unit, ParameterKind::Integer { min, max })
+}
+
+/// Defines a flag.
+pub(super) const fn flag(key: &'static str) -> ParameterDefinition {
+    parameter(key, "", ParameterKind::Flag)
+}
+
+/// Defines a text.
+pub(super) const fn text(key: &'static str) -> ParameterDefinition {
+    parameter(key, "", ParameterKind::Text)
+}
+
+/// Defines a list of texts.
+pub(super) const fn texts(key: &'static str) -> ParameterDefinition {
+    parameter(key, "", ParameterKind::TextList)
+}
+
+/// Defines a choice among texts.
+pub(super) const fn choice(key: &'static str, choices: &'static [&'static str]) -> ParameterDefinition {
+    parameter(key, "", ParameterKind::Choice(choices))
+}
+
+/// Builder methods of definitions; each changes one property.
 impl ParameterDefinition {
-    /// Creates a required machine parameter that is not settable at run time.
-    pub(super) const fn new(key: &'static str, unit: &'static str, kind: ParameterKind) -> Self {
-        Self {
-            key,
-            unit,
-            kind,
-            presence: Presence::Required,
-            is_live: false,
-            scope: Scope::Machine,
-            axis: None,
-            motor: None,
-            description: "",
-        }
-    }
-
-    pub(super) const fn number(key: &'static str, unit: &'static str, min: f64, max: f64) -> Self {
-        Self::new(key, unit, ParameterKind::Number { min, max })
-    }
-
-    pub(super) const fn of_axis(mut self) -> Self {
-        self.scope = Scope::Axis;
+    /// Sets the value in SI units of a value of 1.
+    pub(super) const fn si(mut self, si: f64) -> Self {
+        self.si = si;
         self
     }
 
-    pub(super) const fn of_node(mut self) -> Self {
-        self.scope = Scope::Node;
-        self
-    }
-
+    /// Restricts the parameter to a type of axis.
     pub(super) const fn on(mut self, axis: AxisKind) -> Self {
         self.axis = Some(axis);
-        self.of_axis()
+        self
     }
 
+    /// Restricts the parameter to a type of motor.
     pub(super) const fn driven_by(mut self, motor: MotorKind) -> Self {
         self.motor = Some(motor);
-        self.of_axis()
+        self
     }
 
     pub(super) const fn optional(mut self) -> Self {
@@ -288,13 +323,21 @@ impl ParameterDefinition {
         self
     }
 
+    /// Sets the default 0.
+    pub(super) const fn zero(self) -> Self {
+        self.default(DefaultValue::Number(0.0))
+    }
+
+    /// Makes the parameter settable at run time.
     pub(super) const fn live(mut self) -> Self {
         self.is_live = true;
         self
     }
 
-    pub(super) const fn describe(mut self, description: &'static str) -> Self {
-        self.description = description;
+    /// Sets owner and description.
+    pub(super) const fn described(mut self, scope: Scope, description: &'static str) -> Self {
+        self.scope = scope;
+        self.description = description.trim_ascii_start();
         self
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use thiserror::Error;
 
-use crate::text::nearest_hint;
+use crate::text::shortened;
 
 /// Origin of a value; error messages begin with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -58,117 +58,61 @@ impl fmt::Display for ValueSource {
     }
 }
 
-/// Rejection of a machine file or a parameter. The text is one line.
+/// Rejection of a machine file or a parameter: position, key, value found and allowed values, in one line.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum ConfigError {
-    /// Unreadable file, or a file that is not UTF-8 text.
-    #[error("{path}: cannot be read: {reason}")]
-    Unreadable {
-        /// Path as given by the user.
-        path: String,
-        /// Error of the operating system.
-        reason: String,
-    },
-    /// Name of no built-in machine.
-    #[error("unknown machine {name}{}; built-in machines: {known}", nearest_hint(.nearest))]
-    UnknownMachine {
-        /// Requested name.
-        name: String,
-        /// Most similar built-in machine.
-        nearest: Option<String>,
-        /// Names of the built-in machines, separated by commas.
-        known: String,
-    },
-    /// Invalid YAML, or a duplicate key in a mapping.
-    #[error("{at}: invalid YAML: {reason}")]
-    Syntax {
-        /// Position.
-        at: ValueSource,
-        /// Error of the YAML reader.
-        reason: String,
-    },
-    /// Valid YAML, but not a ROS 2 parameter file.
-    #[error("{at}: not a ROS 2 parameter file: {reason}")]
-    NotAParameterFile {
-        /// Position.
-        at: ValueSource,
-        /// Reason.
-        reason: String,
-    },
-    /// Assignment without `=`.
-    #[error("{at}: expected KEY=VALUE, found {text}{}", part_hint(.text))]
-    NotAnAssignment {
-        /// Position.
-        at: ValueSource,
-        /// Text found.
-        text: String,
-    },
-    /// Parameter that a section sets twice, nested and flat.
-    #[error("{at}: duplicate parameter {key}, first set at {first}")]
-    Duplicate {
-        /// Position of the second value.
-        at: ValueSource,
-        /// Full key.
-        key: String,
-        /// Position of the first value.
-        first: ValueSource,
-    },
-    /// Unknown parameter.
-    #[error("{at}: unknown parameter {key}{}", nearest_hint(.nearest))]
-    UnknownKey {
-        /// Position.
-        at: ValueSource,
-        /// Key found.
-        key: String,
-        /// Most similar known key.
-        nearest: Option<String>,
-    },
-    /// Parameter that this joint does not have.
-    #[error("{at}: {key} does not apply: {reason}")]
-    NotApplicable {
-        /// Position.
-        at: ValueSource,
-        /// Full key.
-        key: String,
-        /// Reason, with the values that decide it.
-        reason: String,
-    },
-    /// Missing required parameter.
-    #[error("{at}: {key} is missing: {wanted}")]
-    Missing {
-        /// Origin of the parameters.
-        at: ValueSource,
-        /// Full key.
-        key: String,
-        /// Description and range.
-        wanted: String,
-    },
-    /// Value of the wrong type.
-    #[error("{at}: {key}: found {found}, expected {wanted}{}", number_hint(.found, .wanted, .at))]
-    WrongType {
-        /// Position.
-        at: ValueSource,
-        /// Full key.
-        key: String,
-        /// Type and value found.
-        found: String,
-        /// Expected type.
-        wanted: String,
-    },
-    /// Value out of range, not among the choices, or inconsistent with another parameter.
-    #[error("{at}: {key} = {value}: must {allowed}")]
-    NotAllowed {
-        /// Position.
-        at: ValueSource,
-        /// Full key.
-        key: String,
-        /// Value.
-        value: String,
-        /// Requirement, a verb phrase after "must".
-        allowed: String,
-    },
+#[error("{text}")]
+pub struct ConfigError {
+    text: String,
+    /// True for a missing parameter.
+    pub(super) is_missing: bool,
 }
+
+impl ConfigError {
+    pub(super) fn new(text: impl fmt::Display) -> Self {
+        ConfigError { text: text.to_string(), is_missing: false }
+    }
+
+    /// Returns an error at a position.
+    pub(super) fn at(at: &ValueSource, reason: impl fmt::Display) -> Self {
+        Self::new(format_args!("{at}: {reason}"))
+    }
+
+    /// Returns the error about a value out of range, not among the choices, or inconsistent with another parameter;
+    /// `allowed` follows "must".
+    pub(super) fn not_allowed(at: &ValueSource, key: &str, value: &str, allowed: &str) -> Self {
+        Self::at(at, format_args!("{} = {value}: must {allowed}", shortened(key)))
+    }
+
+    /// Returns the error about a value of another type.
+    pub(super) fn wrong_type(at: &ValueSource, key: &str, found: &str, wanted: &str) -> Self {
+        let hint = number_hint(found, wanted, at);
+        Self::at(at, format_args!("{}: found {found}, expected {wanted}{hint}", shortened(key)))
+    }
+
+    /// Returns the error about a parameter that a joint does not have.
+    pub(super) fn not_applicable(at: &ValueSource, key: &str, reason: &str) -> Self {
+        Self::at(at, format_args!("{} does not apply: {reason}", shortened(key)))
+    }
+
+    /// Returns the error about a missing parameter.
+    pub(super) fn missing(at: &ValueSource, key: &str, wanted: &str) -> Self {
+        ConfigError { is_missing: true, ..Self::at(at, format_args!("{key} is missing: {wanted}")) }
+    }
+
+    /// Returns the error about an assignment without `=`.
+    pub(super) fn not_an_assignment(at: &ValueSource, text: &str) -> Self {
+        let hint = if is_number(text) { DECIMAL_POINT } else { "" };
+        Self::at(at, format_args!("expected KEY=VALUE, found {}{hint}", shortened(text)))
+    }
+
+    /// Returns the error with `hint` at its end.
+    pub(super) fn with_hint(self, hint: &str) -> Self {
+        ConfigError { text: self.text + hint, ..self }
+    }
+}
+
+/// Remedy for decimals after a comma.
+const DECIMAL_POINT: &str = "; the decimal separator is a point";
 
 /// Returns the remedy for a text in place of a number: several parameters in one option, or a decimal comma.
 fn number_hint(found: &str, wanted: &str, at: &ValueSource) -> String {
@@ -178,15 +122,10 @@ fn number_hint(found: &str, wanted: &str, at: &ValueSource) -> String {
             format!("; repeat {at} for each parameter")
         }
         Some((whole, decimals)) if wanted == "number" && is_number(whole) && is_number(decimals) => {
-            "; the decimal separator is a point".to_owned()
+            DECIMAL_POINT.to_owned()
         }
         _ => String::new(),
     }
-}
-
-/// Returns the remedy for a number in place of an assignment: the decimals after a comma.
-fn part_hint(text: &str) -> &'static str {
-    if is_number(text) { "; the decimal separator is a point" } else { "" }
 }
 
 fn is_number(text: &str) -> bool {

@@ -2,22 +2,15 @@
 
 use std::sync::LazyLock;
 
-use super::definition::{MotorKind, ParameterDefinition, Scope};
+use super::declaration::JointVariant;
+use super::definition::{AxisKind, MotorKind, ParameterDefinition, Scope};
 use super::error::{ConfigError, ValueSource};
-use super::machine::AxisKind;
 use super::schema::DEFINITIONS;
-use crate::text::{nearest_name, shortened};
+use super::value::Value;
+use crate::text::{nearest_hint, nearest_name, shortened};
 
 /// Key prefixes of aliases and of ROS parameter files that are not in the schema and that no joint may have as a name.
 const RESERVED: &[&str] = &["constraints", "qos_overrides", "ros__parameters"];
-
-/// Joint with the axis and motor types that determine its parameters.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct JointVariant {
-    pub name: String,
-    pub axis: AxisKind,
-    pub motor: MotorKind,
-}
 
 /// Joints of a machine, in order.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -60,11 +53,9 @@ impl ParameterLayout {
         self.check_name(key, at)?;
         let excluded = found.and_then(|(joint, suffix)| Some((joint, axis_definitions_of(suffix).next()?)));
         Err(match excluded {
-            Some((joint, definition)) => ConfigError::NotApplicable {
-                at: at.clone(),
-                key: key.to_owned(),
-                reason: joint.exclusion_reason(definition),
-            },
+            Some((joint, definition)) => {
+                ConfigError::not_applicable(at, key, &joint.exclusion_reason(definition))
+            }
             None => self.unknown(key, at),
         })
     }
@@ -82,28 +73,40 @@ impl ParameterLayout {
         let other_joint =
             key.split_once('.').filter(|(_, suffix)| axis_definitions_of(suffix).next().is_some());
         match other_joint {
-            Some((name, _)) if !self.joints.is_empty() => Err(ConfigError::NotApplicable {
-                at: at.clone(),
-                key: shortened(key),
-                reason: format!("there is no joint {}; joints = {}", shortened(name), self.names()),
-            }),
+            Some((name, _)) if !self.joints.is_empty() => {
+                let reason = format!("there is no joint {}; joints = {}", shortened(name), self.names());
+                Err(ConfigError::not_applicable(at, key, &reason))
+            }
             _ => Err(self.unknown(key, at)),
         }
     }
 
-    fn names(&self) -> String {
+    /// Returns true if `key` is a parameter of rclcpp without effect here, or resembles no parameter of this machine, so that
+    /// it is probably meant for another node.
+    pub fn is_foreign(&self, key: &str) -> bool {
+        is_rclcpp_parameter(key)
+            || self.check_name(key, &ValueSource::named("")).is_err() && self.nearest(key).is_none()
+    }
+
+    /// Rejects a value that the parameter `key` does not permit; a parameter of another kind of axis passes.
+    pub fn check_value(&self, key: &str, value: &Value, at: &ValueSource) -> Result<(), ConfigError> {
+        let Ok(definition) = self.find(key, at) else { return Ok(()) };
+        definition.checked(key, value, at).map(|_| ())
+    }
+
+    /// Returns the names of the joints as a list.
+    pub fn names(&self) -> String {
         let names: Vec<&str> = self.joints.iter().map(|joint| joint.name.as_str()).collect();
         format!("[{}]", names.join(", "))
     }
 
+    fn nearest(&self, key: &str) -> Option<String> {
+        self.keys_with_end(key).or_else(|| nearest_name(key, self.definitions().map(|(known, _)| known)))
+    }
+
     fn unknown(&self, key: &str, at: &ValueSource) -> ConfigError {
-        ConfigError::UnknownKey {
-            at: at.clone(),
-            key: shortened(key),
-            nearest: self
-                .keys_with_end(key)
-                .or_else(|| nearest_name(key, self.definitions().map(|(known, _)| known))),
-        }
+        let hint = nearest_hint(&self.nearest(key));
+        ConfigError::at(at, format_args!("unknown parameter {}{hint}", shortened(key)))
     }
 
     /// Returns the keys of the first joint that has keys ending in `.` and `end`, and those of no joint, joined by "or";
@@ -151,6 +154,11 @@ impl JointVariant {
     }
 }
 
+/// Returns true for a parameter that each node of rclcpp may have and that has no effect on this node.
+pub(super) fn is_rclcpp_parameter(key: &str) -> bool {
+    key == "start_type_description_service" || key.starts_with("qos_overrides.")
+}
+
 /// Returns the definitions of axis parameters.
 fn axis_definitions() -> impl Iterator<Item = &'static ParameterDefinition> {
     DEFINITIONS.iter().filter(|definition| definition.scope == Scope::Axis)
@@ -159,6 +167,14 @@ fn axis_definitions() -> impl Iterator<Item = &'static ParameterDefinition> {
 /// Returns the definitions of the axis parameter `key`, which depend on the types of axis and motor.
 fn axis_definitions_of(key: &str) -> impl Iterator<Item = &'static ParameterDefinition> {
     definitions_of(key).filter(|definition| definition.scope == Scope::Axis)
+}
+
+/// Returns the one of the axis parameters `keys` that an axis of this type has.
+pub(super) fn applicable_key<'a>(joint: &JointVariant, keys: &[&'a str]) -> &'a str {
+    let applies = |key: &&&str| {
+        axis_definitions_of(key).any(|definition| definition.applies_to(joint.axis, joint.motor))
+    };
+    keys.iter().find(applies).copied().unwrap_or_default()
 }
 
 /// Returns the definition of the machine or node parameter `key`.

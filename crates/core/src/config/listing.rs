@@ -2,8 +2,7 @@
 
 use std::fmt::Write;
 
-use super::definition::{MotorKind, ParameterDefinition, Presence, Scope};
-use super::machine::AxisKind;
+use super::definition::{AxisKind, MotorKind, ParameterDefinition, Presence, Scope};
 use super::schema::DEFINITIONS;
 use crate::text::wrapped;
 

@@ -13,23 +13,27 @@
 //! ```
 
 mod aliases;
-mod build;
+mod axis;
+mod axis_units;
+mod chain_check;
 mod check;
-mod coupling;
+mod control_check;
+mod controller;
 mod coupling_check;
+mod cross_check;
+mod declaration;
 mod definition;
 mod error;
+mod ignored;
 mod layout;
 pub mod listing;
 mod machine;
 mod node;
-mod node_schema;
 mod parameter_file;
 mod parameters;
 mod plant;
 mod plant_check;
-mod plant_keys;
-mod plant_schema;
+mod rotary_chain;
 mod schema;
 mod value;
 mod writer;
@@ -39,13 +43,17 @@ mod yaml_tree;
 mod tests;
 
 pub use aliases::ParameterAlias;
-pub use coupling::{GantryConfig, WorkpieceConfig};
-pub use definition::{DefaultValue, MotorKind, ParameterDefinition, ParameterKind, Presence, Scope};
+pub use axis::*;
+pub use axis_units::AxisUnits;
+pub use definition::{
+    AxisKind, DefaultValue, MotorKind, ParameterDefinition, ParameterKind, Presence, Scope,
+};
 pub use error::{ConfigError, ValueSource};
 pub use machine::*;
 pub use node::{GoalDefaults, NodeConfig, QosConfig, TimeMode, ToolConfig};
 pub use parameter_file::{Assignment, parse_assignment};
 pub use parameters::{DEFAULT_MACHINE, OverlayReport, Parameters};
 pub use plant::*;
-pub use schema::{DEFINITIONS, MAX_HORIZON, MAX_RST_TERMS};
+pub use rotary_chain::{RotaryChain, RotaryName};
+pub use schema::DEFINITIONS;
 pub use value::Value;

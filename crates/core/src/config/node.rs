@@ -1,24 +1,120 @@
-//! Node configuration: clock, topics, recording and quality of service.
+//! Node configuration: clock, topics, action, recording and quality of service.
 
 use std::path::PathBuf;
+use std::slice;
 
-use super::check::to_ns;
-use super::parameters::Parameters;
+use super::axis::ToleranceConfig;
+use super::declaration::{CheckedValues, Definitions, Field, ParameterGroup, parameters};
+use super::definition::DefaultValue::{Flag, Integer, Number, Text};
+use super::definition::{ParameterDefinition, Scope, choice, flag, integer, number, text};
 use super::value::Value;
-use crate::units::{DEGREE, MILLIMETER, Nanoseconds, SECOND_NS};
+use crate::units::{Nanoseconds, SECOND_NS};
 
 /// Bytes in a megabyte.
-const MEGABYTE: u64 = 1_000_000;
+const MEGABYTE: f64 = 1e6;
+
+/// Defines a default tolerance of action goals.
+const fn tolerance(key: &'static str, unit: &'static str) -> ParameterDefinition {
+    number(key, unit, 0.0, 1e6).zero().live()
+}
+
+parameters! {
+    /// Parameters of the node itself.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct NodeConfig of Node {
+        /// Time source: wall clock, or simulated time as fast as possible, published on /clock.
+        pub time: TimeMode = choice("time", &["real", "fast"]).default(Text("real")) => time_mode;
+        /// Publication rate of joint_states, motor currents, drive states, controller state and tool pose, at most one
+        /// message per position cycle; 0 publishes in every position cycle.
+        pub publish_rate: Option<f64> = number("publish_rate", "Hz", 0.0, 1e6).zero();
+        /// Prefix of the joint names in messages.
+        pub joint_prefix: String = text("joint_prefix").default(Text(""));
+        /// Timeout after which an external load returns to zero.
+        pub load_timeout: Nanoseconds = number("load_timeout", "s", 1e-3, 3600.0).default(Number(0.1)).si(SECOND_NS as f64);
+        /// Maximum number of points of a trajectory.
+        pub max_points: usize = integer("max_points", "", 1, 100_000_000).default(Integer(1_000_000));
+        /// Accept trajectories with a nonzero velocity at the last point.
+        pub allow_nonzero_velocity_at_trajectory_end: bool =
+            flag("allow_nonzero_velocity_at_trajectory_end").default(Flag(false)).live();
+        /// Tool pose and tool path topics.
+        pub tool: ToolConfig;
+        /// Rate of the action feedback in node time, at most one message per position cycle.
+        pub action_monitor_rate: f64 = number("action_monitor_rate", "Hz", 0.1, 1e6).default(Number(20.0));
+        /// Default tolerances of action goals.
+        pub goals: GoalDefaults;
+        /// Interpolation of trajectories between points: by the fields of the points, or none: the setpoint is the next
+        /// point, within the velocity limits.
+        pub interpolates: bool = choice("interpolation_method", &["splines", "none"]).default(Text("splines"))
+            => |values, rows| Some(String::read(values, rows)? == "splines");
+        /// Use the time of the topic /clock.
+        pub use_sim_time: bool = flag("use_sim_time").default(Flag(false));
+        /// MCAP file for recording all topics of the node; it must not exist; empty disables recording.
+        pub record: Option<PathBuf> = text("record").default(Text(""));
+        /// Maximum size of the recording, which is closed there; the axes continue.
+        pub record_max: u64 = integer("record_max_mb", "MB", 1, 1_000_000).default(Integer(1024)).si(MEGABYTE);
+        use TopicQos;
+    }
+}
+
+parameters! {
+    /// Default tolerances of action goals.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct GoalDefaults of Node {
+        /// Path tolerance of each axis, m or rad; `None` disables it.
+        pub path: Vec<Option<f64>> => |values, _| of_axes(values, |axis| axis.path);
+        /// Goal tolerance of each axis, m or rad; `None` disables it.
+        pub goal: Vec<Option<f64>> => |values, _| of_axes(values, |axis| axis.goal);
+        /// Default goal time tolerance of action goals; 0 disables it.
+        pub goal_time: Option<Nanoseconds> = tolerance("goal_time_tolerance", "s").si(SECOND_NS as f64);
+        /// Default goal tolerance of the velocity of action goals, on the velocity error at the end of the trajectory;
+        /// 0 disables it.
+        pub stopped_velocity: Option<f64> = tolerance("stopped_velocity_tolerance", "m/s or rad/s");
+        /// Timeout after the end of a trajectory for action goals without a goal time tolerance, which abort then; 0
+        /// disables it.
+        pub timeout: Option<Nanoseconds> = tolerance("cmd_timeout", "s").si(SECOND_NS as f64);
+    }
+}
+
+parameters! {
+    /// Tool pose and tool path topics.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct ToolConfig of Node {
+        /// Frame id of tool poses and paths.
+        pub frame: String = text("workpiece_frame").default(Text("workpiece"));
+        /// Publication rate of the tool paths during motion; 0 disables them.
+        pub path_rate: Option<f64> = number("tool_path_rate", "Hz", 0.0, 100.0).default(Number(2.0));
+        /// Maximum number of poses of a tool path; the oldest are removed.
+        pub path_length: usize = integer("tool_path_length", "", 2, 100_000).default(Integer(2000));
+    }
+}
 
 /// Time source of the node.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum TimeMode {
     /// Wall-clock time.
+    #[default]
     Real,
     /// Simulated time, as fast as the computer and the subscribers permit; the node publishes `/clock`.
     Fast,
     /// Time from the topic `/clock` (`use_sim_time`).
     SimTime,
+}
+
+fn time_mode(values: &CheckedValues<'_>, rows: Definitions) -> Option<TimeMode> {
+    let uses_clock = values.entries.get("use_sim_time").is_some_and(|entry| entry.value == Value::Bool(true));
+    Some(match String::read(values, rows)?.as_str() {
+        _ if uses_clock => TimeMode::SimTime,
+        "fast" => TimeMode::Fast,
+        _ => TimeMode::Real,
+    })
+}
+
+/// Returns a tolerance of each axis.
+fn of_axes(
+    values: &CheckedValues<'_>,
+    tolerance: fn(ToleranceConfig) -> Option<f64>,
+) -> Option<Vec<Option<f64>>> {
+    Some(values.of_axes()?.into_iter().map(tolerance).collect())
 }
 
 /// Quality of service of a topic.
@@ -32,140 +128,62 @@ pub struct QosConfig {
     pub depth: usize,
 }
 
-/// Parameters of the node itself.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NodeConfig {
-    /// Time source.
-    pub time: TimeMode,
-    /// Publication rate of `joint_states`, Hz; `None` publishes in every position cycle.
-    pub publish_rate: Option<f64>,
-    /// Prefix of the joint names in messages.
-    pub joint_prefix: String,
-    /// Timeout after which an external load returns to zero, ns.
-    pub load_timeout: Nanoseconds,
-    /// Maximum number of points of a trajectory.
-    pub max_points: usize,
-    /// True if trajectories are interpolated between their points.
-    pub interpolates: bool,
-    /// True if the last point of a trajectory may have a nonzero velocity.
-    pub allow_nonzero_velocity_at_trajectory_end: bool,
-    /// Rate of the action feedback, Hz.
-    pub action_monitor_rate: f64,
-    /// Tool pose and tool path topics.
-    pub tool: ToolConfig,
-    /// File for recording the topics; `None` disables recording.
-    pub record: Option<PathBuf>,
-    /// Maximum size of the recording, bytes.
-    pub record_max: u64,
-    /// Number of departed remote endpoints after which the DDS participant is renewed; `None` disables it.
-    pub renewal_endpoints: Option<u64>,
+/// Defines the QoS parameters of topics: reliability, durability and depth.
+macro_rules! qos {
+    ($($topic:literal: $reliability:literal, $durability:literal, $depth:literal;)+) => {
+        &[$([
+            choice(concat!("qos.", $topic, ".reliability"), &["reliable", "best_effort"])
+                .default(Text($reliability))
+                .described(Scope::Node, "Reliability QoS policy of the topic."),
+            choice(concat!("qos.", $topic, ".durability"), &["volatile", "transient_local"])
+                .default(Text($durability))
+                .described(Scope::Node, "Durability QoS policy of the topic."),
+            integer(concat!("qos.", $topic, ".depth"), "", 1, 100_000)
+                .default(Integer($depth))
+                .described(Scope::Node, "History depth of the topic (keep last)."),
+        ],)+]
+    };
 }
 
-/// Default tolerances of action goals.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct GoalDefaults {
-    /// Path tolerance of each axis, m or rad; `None` disables it.
-    pub path: Vec<Option<f64>>,
-    /// Goal tolerance of each axis, m or rad; `None` disables it.
-    pub goal: Vec<Option<f64>>,
-    /// Goal tolerance of the velocity of all axes, m/s or rad/s; `None` disables it.
-    pub stopped_velocity: Option<f64>,
-    /// Goal time tolerance, ns; `None` disables it.
-    pub goal_time: Option<Nanoseconds>,
-    /// Goal time tolerance of goals that have none, ns; `None` disables it.
-    pub timeout: Option<Nanoseconds>,
+/// QoS parameters of each topic. Those of `psec_stream` match the publisher of ros2_control's topic-based hardware, which
+/// sends the last setpoint of a move only once.
+const QOS: &[[ParameterDefinition; 3]] = qos! {
+    "psec": "reliable", "volatile", 64;
+    "psec_stream": "reliable", "volatile", 10;
+    "speed_scaling_input": "reliable", "volatile", 10;
+    "load": "best_effort", "volatile", 10;
+    "joint_states": "reliable", "volatile", 10;
+    "motor_currents": "reliable", "volatile", 10;
+    "drive_states": "reliable", "volatile", 10;
+    "controller_state": "reliable", "volatile", 10;
+    "tool_pose": "reliable", "volatile", 10;
+    "tool_path": "reliable", "volatile", 1;
+    "tool_path_setpoint": "reliable", "volatile", 1;
+    "trajectory_result": "reliable", "transient_local", 50;
+    "diagnostics": "reliable", "volatile", 10;
+    "clock": "reliable", "volatile", 10;
+};
+
+/// QoS parameters of all topics, which [`qos`] reads.
+struct TopicQos;
+
+impl ParameterGroup for TopicQos {
+    fn define(out: &mut Vec<ParameterDefinition>) {
+        out.extend_from_slice(QOS.as_flattened());
+    }
+
+    fn read(_: &CheckedValues<'_>) -> Option<Self> {
+        Some(TopicQos)
+    }
 }
 
-/// Tool pose and tool path topics.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ToolConfig {
-    /// Frame id of tool poses and paths.
-    pub frame: String,
-    /// Publication rate of the tool paths, Hz; `None` disables them.
-    pub path_rate: Option<f64>,
-    /// Maximum number of poses of a tool path.
-    pub path_length: usize,
-}
-
-impl Parameters {
-    /// Returns the quality of service of a topic, such as `psec` or `motor_currents`; none for a topic that is not in the
-    /// schema.
-    pub fn qos(&self, topic: &str) -> Option<QosConfig> {
-        let Some(Value::Integer(depth)) = self.get(&format!("qos.{topic}.depth")) else { return None };
-        Some(QosConfig {
-            is_reliable: self.text(&format!("qos.{topic}.reliability")) == "reliable",
-            is_transient_local: self.text(&format!("qos.{topic}.durability")) == "transient_local",
-            depth: usize::try_from(depth).unwrap_or(1),
-        })
-    }
-
-    /// Returns the node configuration.
-    pub fn node_config(&self) -> NodeConfig {
-        let time = if self.flag("use_sim_time") {
-            TimeMode::SimTime
-        } else if self.text("time") == "fast" {
-            TimeMode::Fast
-        } else {
-            TimeMode::Real
-        };
-        // All of these parameters have defaults; the fallbacks here are unused.
-        let number = |key: &str| self.number(key).unwrap_or_default();
-        let rate = number("publish_rate");
-        let count = |key: &str| match self.get(key) {
-            Some(Value::Integer(count)) => usize::try_from(count).unwrap_or(usize::MAX),
-            _ => usize::MAX,
-        };
-        let path_rate = number("tool_path_rate");
-        let record = self.text("record");
-        let record_max = match self.get("record_max_mb") {
-            Some(Value::Integer(size)) => u64::try_from(size).unwrap_or_default() * MEGABYTE,
-            _ => u64::MAX,
-        };
-        let renewal_endpoints = match self.get("renewal_endpoints") {
-            Some(Value::Integer(count)) => u64::try_from(count).ok().filter(|&count| count > 0),
-            _ => None,
-        };
-        NodeConfig {
-            time,
-            publish_rate: (rate > 0.0).then_some(rate),
-            joint_prefix: self.text("joint_prefix"),
-            load_timeout: to_ns(number("load_timeout"), SECOND_NS),
-            max_points: count("max_points"),
-            interpolates: self.text("interpolation_method") == "splines",
-            allow_nonzero_velocity_at_trajectory_end: self.flag("allow_nonzero_velocity_at_trajectory_end"),
-            action_monitor_rate: number("action_monitor_rate"),
-            tool: ToolConfig {
-                frame: self.text("workpiece_frame"),
-                path_rate: (path_rate > 0.0).then_some(path_rate),
-                path_length: count("tool_path_length"),
-            },
-            record: (!record.is_empty()).then(|| PathBuf::from(record)),
-            record_max,
-            renewal_endpoints,
-        }
-    }
-
-    /// Returns the default tolerances of action goals, for the axes in the order of `joints`.
-    pub fn goal_defaults(&self) -> GoalDefaults {
-        // 0, or a key that does not apply to this type of axis, is no tolerance.
-        let positive = |key: &str| self.number(key).ok().filter(|&value| value > 0.0);
-        let column = |what: &str| {
-            let tolerance = |joint: &String| {
-                let key = |unit: &str| format!("{joint}.tolerances.{what}_{unit}");
-                let linear = positive(&key("mm")).map(|value| value * MILLIMETER);
-                linear.or_else(|| positive(&key("deg")).map(|value| value * DEGREE))
-            };
-            match self.get("joints") {
-                Some(Value::TextList(joints)) => joints.iter().map(tolerance).collect(),
-                _ => Vec::new(),
-            }
-        };
-        GoalDefaults {
-            path: column("path"),
-            goal: column("goal"),
-            stopped_velocity: positive("stopped_velocity_tolerance"),
-            goal_time: positive("goal_time_tolerance").map(|value| to_ns(value, SECOND_NS)),
-            timeout: positive("cmd_timeout").map(|value| to_ns(value, SECOND_NS)),
-        }
-    }
+/// Returns the quality of service of a topic; `None` for a topic without parameters.
+pub(super) fn qos(values: &CheckedValues<'_>, topic: &str) -> Option<QosConfig> {
+    let key = format!("qos.{topic}.reliability");
+    let [reliability, durability, depth] = QOS.iter().find(|rows| rows[0].key == key)?;
+    Some(QosConfig {
+        is_reliable: String::read(values, slice::from_ref(reliability))? == "reliable",
+        is_transient_local: String::read(values, slice::from_ref(durability))? == "transient_local",
+        depth: usize::read(values, slice::from_ref(depth))?,
+    })
 }

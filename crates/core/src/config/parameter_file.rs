@@ -1,6 +1,6 @@
 //! Parser of ROS 2 parameter files: sections by node name, flattened to dotted keys.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use serde_saphyr::Spanned;
 
@@ -26,6 +26,7 @@ pub struct Assignment {
 }
 
 /// Parameters of a file for one node.
+#[derive(Default)]
 pub(super) struct ParameterFile {
     /// Parameters in the order of the file. A later section can set a key again and takes precedence.
     pub assignments: Vec<Assignment>,
@@ -33,6 +34,10 @@ pub(super) struct ParameterFile {
     pub skipped: Vec<String>,
     /// Number of sections for this node.
     pub matched: usize,
+    /// Keys that only sections for several nodes set.
+    pub shared: HashSet<String>,
+    /// Error about the first key without value (`null`, as `ros2 param dump` writes a parameter that is not set).
+    pub unset: Option<ConfigError>,
 }
 
 /// Reads the parameters of `text` for the node `node` (fully qualified, `/ns/name`). With `None`, reads the only section, or
@@ -56,15 +61,20 @@ pub(super) fn read(
     }
 
     let only = sections.len() == 1 && node.is_none();
-    let mut file = ParameterFile { assignments: Vec::new(), skipped: Vec::new(), matched: 0 };
+    let mut file = ParameterFile::default();
+    let mut own = HashSet::new();
     for section in sections {
         if only || matches(&section.path, node.unwrap_or(ANY_NODE)) {
             file.matched += 1;
-            section.flatten(source, &mut file.assignments)?;
+            let first = file.assignments.len();
+            let keys = if section.path.contains('*') { &mut file.shared } else { &mut own };
+            section.flatten(source, &mut file.assignments, &mut file.unset)?;
+            keys.extend(file.assignments[first..].iter().map(|one| one.key.clone()));
         } else {
             file.skipped.push(shortened(&section.path));
         }
     }
+    file.shared.retain(|key| !own.contains(key));
     Ok(file)
 }
 
@@ -75,10 +85,9 @@ const ANY_NODE: &str = "/virtual_axes";
 ///
 /// # Errors
 ///
-/// [`ConfigError::NotAnAssignment`] without key or `=`, [`ConfigError::Syntax`] for invalid YAML and
-/// [`ConfigError::WrongType`] for a value that is not of a ROS parameter type.
+/// [`ConfigError`] without key or `=`, for invalid YAML, and for a value that is not of a ROS parameter type.
 pub fn parse_assignment(text: &str, source: &ValueSource) -> Result<Assignment, ConfigError> {
-    let not_an_assignment = || ConfigError::NotAnAssignment { at: source.clone(), text: shortened(text) };
+    let not_an_assignment = || ConfigError::not_an_assignment(source, text);
     let (key, value) = text.split_once('=').ok_or_else(not_an_assignment)?;
     let key = key.strip_suffix(':').unwrap_or(key).trim();
     if key.is_empty() {
@@ -97,16 +106,11 @@ pub fn parse_assignment(text: &str, source: &ValueSource) -> Result<Assignment, 
 }
 
 fn not_a_parameter_file(at: &ValueSource, reason: String) -> ConfigError {
-    ConfigError::NotAParameterFile { at: at.clone(), reason }
+    ConfigError::at(at, format_args!("not a ROS 2 parameter file: {reason}"))
 }
 
 fn no_value(at: &ValueSource, key: &str, found: &YamlNode) -> ConfigError {
-    ConfigError::WrongType {
-        at: at.clone(),
-        key: shortened(key),
-        found: found.described().to_owned(),
-        wanted: "a value".to_owned(),
-    }
+    ConfigError::wrong_type(at, key, found.described(), "a value")
 }
 
 /// Parameters of the nodes whose names match `path`.
@@ -117,10 +121,15 @@ struct Section {
 }
 
 impl Section {
-    fn flatten(self, source: &ValueSource, out: &mut Vec<Assignment>) -> Result<(), ConfigError> {
+    fn flatten(
+        self,
+        source: &ValueSource,
+        out: &mut Vec<Assignment>,
+        unset: &mut Option<ConfigError>,
+    ) -> Result<(), ConfigError> {
         let mut lines = HashMap::new();
         match self.parameters.value {
-            YamlNode::Map(entries) => flatten(entries, "", source, &mut lines, out),
+            YamlNode::Map(entries) => flatten(entries, "", source, &mut lines, out, unset),
             // All parameters of the section are commented out.
             YamlNode::Null => Ok(()),
             other => Err(not_a_parameter_file(
@@ -137,22 +146,25 @@ fn flatten(
     source: &ValueSource,
     lines: &mut HashMap<String, u64>,
     out: &mut Vec<Assignment>,
+    unset: &mut Option<ConfigError>,
 ) -> Result<(), ConfigError> {
     for (name, node) in entries {
         let line = name.referenced.line();
         let at = source.at_line(line);
         let key = if prefix.is_empty() { name.value } else { format!("{prefix}.{}", name.value) };
         match node.value {
-            YamlNode::Map(entries) => flatten(entries, &key, source, lines, out)?,
+            YamlNode::Map(entries) => flatten(entries, &key, source, lines, out, unset)?,
             YamlNode::Scalar(value) => {
                 if let Some(first) = lines.insert(key.clone(), line) {
-                    return Err(ConfigError::Duplicate {
-                        at,
-                        key: shortened(&key),
-                        first: source.at_line(first),
-                    });
+                    let first = source.at_line(first);
+                    let key = shortened(&key);
+                    let reason = format_args!("duplicate parameter {key}, first set at {first}");
+                    return Err(ConfigError::at(&at, reason));
                 }
                 out.push(Assignment { key, value, source: at });
+            }
+            YamlNode::Null => {
+                unset.get_or_insert(no_value(&at, &key, &YamlNode::Null));
             }
             other => return Err(no_value(&at, &key, &other)),
         }

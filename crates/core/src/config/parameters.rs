@@ -5,21 +5,23 @@ use std::io::Read;
 use std::path::Path;
 
 use super::aliases::{self, ParameterAlias};
-use super::check::{Entries, ParameterEntry, check, joint_names};
+use super::check::{check, joint_names};
+use super::controller;
+use super::declaration::{CheckedValues, Entries, ParameterEntry, ParameterGroup};
 use super::definition::{ParameterDefinition, Scope};
 use super::error::{ConfigError, ValueSource};
+use super::ignored::FileFilter;
 use super::layout::{ParameterLayout, plain_definition};
+use super::machine::MachineConfig;
+use super::node::{self, NodeConfig, QosConfig};
 use super::parameter_file::{self, Assignment, parse_assignment};
 use super::value::Value;
-use crate::text::{nearest_hint, nearest_name, shortened};
+use crate::text::{BuiltinFiles, builtin_names, builtin_text, nearest_hint, nearest_name, shortened};
 
-/// Built-in machines: name and parameter file, the default first.
-const BUILTIN: &[(&str, &str)] = &[
-    ("mikron_ucp710", include_str!("../../config/mikron_ucp710.yaml")),
-    ("linear_motor_center", include_str!("../../config/linear_motor_center.yaml")),
-];
 /// Name of the default machine, the Mikron UCP 710.
 pub const DEFAULT_MACHINE: &str = "mikron_ucp710";
+/// Parameter file of the default machine.
+const DEFAULT_FILE: &str = include_str!("../../config/mikron_ucp710.yaml");
 /// Maximum size of a parameter file, bytes; a machine file has about 10 kB.
 const MAX_FILE_BYTES: u64 = 4 << 20;
 
@@ -42,11 +44,14 @@ pub struct OverlayReport {
     pub sections: usize,
     /// Names of the sections for other nodes.
     pub skipped: Vec<String>,
+    /// Reasons why parameters are ignored: this node does not have them, or cannot follow the value for a controller.
+    pub ignored: Vec<String>,
 }
 
-/// Returns the names of the built-in machines, separated by commas.
-fn builtin_name_list() -> String {
-    Parameters::builtin_names().collect::<Vec<_>>().join(", ")
+/// Returns the end of a message about an unknown machine: the nearest built-in machine, and all of them.
+fn nearest_machine(name: &str, builtin: &BuiltinFiles) -> String {
+    let hint = nearest_hint(&nearest_name(name, builtin_names(builtin)));
+    format!("{hint}; built-in machines: {}", builtin_names(builtin).collect::<Vec<_>>().join(", "))
 }
 
 impl Parameters {
@@ -56,41 +61,28 @@ impl Parameters {
     ///
     /// Any [`ConfigError`], which a test excludes for the embedded file.
     pub fn embedded_default() -> Result<Self, ConfigError> {
-        Self::builtin(DEFAULT_MACHINE)
+        Self::from_yaml(DEFAULT_FILE, &format!("{DEFAULT_MACHINE}.yaml"))
     }
 
-    /// Returns the names of the built-in machines, the default first.
-    pub fn builtin_names() -> impl Iterator<Item = &'static str> {
-        BUILTIN.iter().map(|(name, _)| *name)
-    }
-
-    /// Returns true if `text` is or resembles the name of a built-in machine or of a machine file; as a value of the
+    /// Returns true if `text` is or resembles the name of a machine of `builtin` or of a machine file; as a value of the
     /// parameter `machine`, which is a name only, it is probably meant to select that machine.
-    pub fn names_machine(text: &str) -> bool {
+    pub fn names_machine(text: &str, builtin: &BuiltinFiles) -> bool {
         let is_file = text.contains('/') || text.ends_with(".yaml") || text.ends_with(".yml");
-        is_file || nearest_name(text, Self::builtin_names()).is_some()
+        is_file || nearest_name(text, builtin_names(builtin)).is_some()
     }
 
-    /// Returns the built-in machine `name`.
+    /// Returns the file of the machine `name` of `builtin`.
     ///
     /// # Errors
     ///
-    /// [`ConfigError::UnknownMachine`].
-    pub fn builtin(name: &str) -> Result<Self, ConfigError> {
-        Self::from_yaml(Self::builtin_text(name)?, &format!("{name}.yaml"))
-    }
-
-    /// Returns the machine file of the built-in machine `name`.
-    ///
-    /// # Errors
-    ///
-    /// [`ConfigError::UnknownMachine`].
-    pub fn builtin_text(name: &str) -> Result<&'static str, ConfigError> {
-        let found = BUILTIN.iter().find(|(known, _)| *known == name);
-        found.map(|(_, text)| *text).ok_or_else(|| ConfigError::UnknownMachine {
-            name: shortened(name),
-            nearest: nearest_name(name, Self::builtin_names()),
-            known: builtin_name_list(),
+    /// [`ConfigError`] for the name of no built-in machine.
+    pub fn builtin_text(name: &str, builtin: &BuiltinFiles) -> Result<&'static str, ConfigError> {
+        builtin_text(builtin, name).ok_or_else(|| {
+            ConfigError::new(format_args!(
+                "unknown machine {}{}",
+                shortened(name),
+                nearest_machine(name, builtin)
+            ))
         })
     }
 
@@ -100,10 +92,11 @@ impl Parameters {
     ///
     /// # Errors
     ///
-    /// Any [`ConfigError`] except [`ConfigError::Unreadable`].
+    /// Any [`ConfigError`].
     pub fn from_yaml(text: &str, source: &str) -> Result<Self, ConfigError> {
         let source = ValueSource::file(source);
         let file = parameter_file::read(text, &source, None)?;
+        file.unset.map_or(Ok(()), Err)?;
         Self::from_assignments(Entries::new(), file.assignments, &source)
     }
 
@@ -117,37 +110,33 @@ impl Parameters {
         Self::from_yaml(&read_text(path)?, &path.to_string_lossy())
     }
 
-    /// Loads the built-in machine `machine`, or the machine file `machine` if there is none.
+    /// Loads the machine `machine` of `builtin`, or the machine file `machine` if there is none.
     ///
     /// # Errors
     ///
     /// Any [`ConfigError`].
-    pub fn load(machine: &str) -> Result<Self, ConfigError> {
-        if Self::builtin_names().any(|name| name == machine) {
-            return Self::builtin(machine);
+    pub fn load(machine: &str, builtin: &BuiltinFiles) -> Result<Self, ConfigError> {
+        if let Some(text) = builtin_text(builtin, machine) {
+            return Self::from_yaml(text, &format!("{machine}.yaml"));
         }
-        Self::from_file(machine).map_err(|error| match error {
-            ConfigError::Unreadable { path, reason } if !Path::new(machine).exists() => {
-                let hint = nearest_hint(&nearest_name(machine, Self::builtin_names()));
-                ConfigError::Unreadable {
-                    path,
-                    reason: format!("{reason}{hint}; built-in machines: {}", builtin_name_list()),
-                }
-            }
-            other => other,
-        })
+        let text = read_text(Path::new(machine)).map_err(|error| match Path::new(machine).exists() {
+            true => error,
+            false => error.with_hint(&nearest_machine(machine, builtin)),
+        })?;
+        Self::from_yaml(&text, machine)
     }
 
     /// Sets the parameters of a ROS 2 parameter file for the node `node` (fully qualified, `/ns/name`). With `None`, the
     /// only section of the file applies, or the sections that match `/virtual_axes`.
     ///
-    /// Sections match by the rules of ROS 2 (`*`, `**`); later sections take precedence. A file with `machine`, or with
+    /// Sections match by the rules of ROS 2 (`*`, `**`); later sections take precedence. Parameters that this node does not
+    /// have are ignored in sections for several nodes and in files of controllers; in a complete machine they are errors. A file with `machine`, or with
     /// `joints` and the type of one, is a complete machine and replaces the present machine; the parameters of the node
     /// remain.
     ///
     /// # Errors
     ///
-    /// Any [`ConfigError`] except [`ConfigError::Unreadable`]; `self` remains unchanged.
+    /// Any [`ConfigError`]; `self` remains unchanged.
     pub fn overlay_yaml(
         &mut self,
         text: &str,
@@ -156,14 +145,26 @@ impl Parameters {
     ) -> Result<OverlayReport, ConfigError> {
         let source = ValueSource::file(source);
         let file = parameter_file::read(text, &source, node)?;
-        let has = |wanted: &dyn Fn(&str) -> bool| file.assignments.iter().any(|one| wanted(&one.key));
+        let mut assignments = file.assignments;
+        let has = |wanted: &dyn Fn(&str) -> bool| assignments.iter().any(|one| wanted(&one.key));
         let has_joints = has(&|key| key == "joints");
+        let is_machine_replaced =
+            has(&|key| key == "machine") || has_joints && has(&|key| key.ends_with(".type"));
+        // The node reads its own dump, in which a parameter without value is null.
+        file.unset.filter(|_| is_machine_replaced && node.is_none()).map_or(Ok(()), Err)?;
+        let filter = FileFilter {
+            entries: &self.entries,
+            layout: &self.layout,
+            shared: &file.shared,
+            is_machine: is_machine_replaced,
+        };
+        let ignored = filter.remove_ignored(&mut assignments).iter().map(ToString::to_string).collect();
         let report = OverlayReport {
-            parameters: file.assignments.len(),
-            is_machine_replaced: has(&|key| key == "machine")
-                || has_joints && has(&|key| key.ends_with(".type")),
+            parameters: assignments.len(),
+            is_machine_replaced,
             sections: file.matched,
             skipped: file.skipped,
+            ignored,
         };
         let mut base = self.entries.clone();
         if report.is_machine_replaced {
@@ -172,9 +173,24 @@ impl Parameters {
             });
         }
         let needs_machine = report.is_machine_replaced || has_joints;
-        *self = Self::from_parts(base, &self.layout, file.assignments, &source)
-            .map_err(|error| if needs_machine { explain_replacement(error) } else { error })?;
+        *self = Self::from_parts(base, &self.layout, assignments, &source).map_err(|error| {
+            match needs_machine && error.is_missing {
+                true => error.with_hint(REPLACEMENT_HINT),
+                false => error,
+            }
+        })?;
         Ok(report)
+    }
+
+    /// Returns the reason why the node ignores a parameter of its command line: it resembles no parameter of this node and is
+    /// probably meant for another one, is a parameter of rclcpp without effect here, or of a controller with a value that the
+    /// node cannot follow.
+    pub fn ignored(&self, Assignment { key, value, source }: &Assignment) -> Option<ConfigError> {
+        match controller::find(key) {
+            Some(parameter) => parameter.check(key, value, source).err(),
+            None if aliases::is_alias(key) || !self.layout.is_foreign(key) => None,
+            None => self.layout.check_name(key, source).err(),
+        }
     }
 
     /// Sets the parameters of the file `path`, see [`overlay_yaml`](Self::overlay_yaml).
@@ -195,7 +211,7 @@ impl Parameters {
     ///
     /// # Errors
     ///
-    /// Any [`ConfigError`] except [`ConfigError::Unreadable`]; `self` remains unchanged.
+    /// Any [`ConfigError`]; `self` remains unchanged.
     pub fn set(&mut self, key: &str, value: Value, source: &ValueSource) -> Result<(), ConfigError> {
         self.set_all(vec![Assignment { key: key.to_owned(), value, source: source.clone() }])
     }
@@ -204,7 +220,7 @@ impl Parameters {
     ///
     /// # Errors
     ///
-    /// The errors of [`set`](Self::set), and [`ConfigError::NotAnAssignment`].
+    /// The errors of [`set`](Self::set), and that about a text without `=`.
     pub fn set_text(&mut self, text: &str, source: &ValueSource) -> Result<(), ConfigError> {
         self.set_all(vec![parse_assignment(text, source)?])
     }
@@ -227,7 +243,7 @@ impl Parameters {
     ///
     /// # Errors
     ///
-    /// [`ConfigError::Missing`] if the parameter is required; `self` remains unchanged.
+    /// [`ConfigError`] if the parameter is required; `self` remains unchanged.
     pub fn unset(&mut self, key: &str, source: &ValueSource) -> Result<(), ConfigError> {
         let mut entries = self.entries.clone();
         if entries.remove(key).is_some() {
@@ -255,7 +271,8 @@ impl Parameters {
         let (aliases, assignments): (Vec<_>, Vec<_>) =
             assignments.into_iter().partition(|assignment| aliases::is_alias(&assignment.key));
         for Assignment { key, value, source } in assignments {
-            if aliases::describes_node(&key, &value, &source)? {
+            if let Some(parameter) = controller::find(&key) {
+                parameter.check(&key, &value, &source)?;
                 continue;
             }
             changed.push(key.clone());
@@ -287,7 +304,7 @@ impl Parameters {
 
     /// Returns the parameter that the alias `key` names; `None` if it is no alias.
     pub fn alias(&self, key: &str) -> Option<ParameterAlias> {
-        let plain = aliases::without_prefix(key, &self.text("joint_prefix"));
+        let plain = aliases::without_prefix(key, aliases::joint_prefix(&self.entries));
         aliases::find(&plain, |name| Some(self.layout.joints.iter().find(|joint| joint.name == name)?.axis))
     }
 
@@ -328,30 +345,43 @@ impl Parameters {
         self.definitions().filter_map(|(key, _)| self.get(&key).map(|value| (key, value)))
     }
 
-    pub(super) fn layout(&self) -> &ParameterLayout {
-        &self.layout
+    fn values(&self) -> CheckedValues<'_> {
+        CheckedValues { entries: &self.entries, joints: &self.layout.joints, joint: None }
+    }
+
+    /// Returns the machine configuration in SI units.
+    ///
+    /// # Errors
+    ///
+    /// [`ConfigError`] for a missing parameter, which cannot happen in a checked parameter set.
+    pub fn machine_config(&self) -> Result<MachineConfig, ConfigError> {
+        MachineConfig::read(&self.values()).ok_or_else(|| {
+            ConfigError::missing(&ValueSource::named("parameters"), "machine", "expected all its parameters")
+        })
+    }
+
+    /// Returns the node configuration.
+    pub fn node_config(&self) -> NodeConfig {
+        // All parameters of the node have defaults.
+        NodeConfig::read(&self.values()).unwrap_or_default()
+    }
+
+    /// Returns the quality of service of a topic, such as `psec` or `motor_currents`; none for a topic that is not in the
+    /// schema.
+    pub fn qos(&self, topic: &str) -> Option<QosConfig> {
+        node::qos(&self.values(), topic)
     }
 }
 
-/// Adds to a missing key that the file replaces the whole machine.
-fn explain_replacement(error: ConfigError) -> ConfigError {
-    match error {
-        ConfigError::Missing { at, key, wanted } => ConfigError::Missing {
-            at,
-            key,
-            wanted: format!(
-                "{wanted}; a file with `machine` or other `joints` must be a complete machine, omit both to \
-                 change parameters of the present machine"
-            ),
-        },
-        other => other,
-    }
-}
+/// Remedy for a missing key of a file that replaces the whole machine.
+const REPLACEMENT_HINT: &str = "; a file with `machine` or other `joints` must be a complete machine, omit both to \
+                                change parameters of the present machine";
 
 /// Reads a text file of limited size.
 fn read_text(path: &Path) -> Result<String, ConfigError> {
-    let unreadable =
-        |reason: String| ConfigError::Unreadable { path: path.to_string_lossy().into_owned(), reason };
+    let unreadable = |reason: String| {
+        ConfigError::new(format_args!("{}: cannot be read: {reason}", path.to_string_lossy()))
+    };
     let mut bytes = Vec::new();
     File::open(path)
         .and_then(|file| file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))

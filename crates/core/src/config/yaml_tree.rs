@@ -11,8 +11,9 @@ use crate::yaml::{self, YamlError};
 
 /// Reads one YAML document.
 pub(super) fn parse(text: &str, source: &ValueSource) -> Result<Spanned<YamlNode>, ConfigError> {
-    yaml::document(text)
-        .map_err(|YamlError { line, reason }| ConfigError::Syntax { at: source.at_line(line), reason })
+    yaml::document(text).map_err(|YamlError { line, reason }| {
+        ConfigError::at(&source.at_line(line), format_args!("invalid YAML: {reason}"))
+    })
 }
 
 /// Node of a YAML tree with the node types that parameter files use.

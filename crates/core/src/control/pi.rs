@@ -1,4 +1,8 @@
 //! PI controller with feedforward, output limit and anti-windup by conditional integration.
+//!
+//! The controllers of several axes run side by side: `Pi<N>` is a controller with numbers of the type N, an `f64` for one
+//! axis or a SIMD vector with one axis in each lane, on which the same equations act ([`SimdReal`]). `soa_struct!` declares
+//! such types. `a.select(mask, b)` is `if mask { a } else { b }`, decided in each lane.
 
 use nalgebra::Complex;
 
@@ -18,6 +22,20 @@ soa_struct! {
     /// limited and the error would increase the excess. The output of that cycle is not recomputed.
     ///
     /// `scale` converts the output: the velocity loop computes a torque and is limited in current, with scale 1/Kt.
+    ///
+    /// ```
+    /// use virtual_axes_core::config::PiConfig;
+    /// use virtual_axes_core::control::{Pi, PiState};
+    ///
+    /// // K = 2, Ti = 4 s, T = 0.5 s, scale 1, limit 10: K T/Ti = 0.25.
+    /// let pi = Pi::new(&PiConfig { gain: 2.0, integral_time: 4.0 }, 0.5, 1.0, 10.0);
+    /// let mut state = PiState::default();
+    /// assert_eq!(pi.update(&mut state, 1.0), 2.25);
+    /// assert_eq!(pi.update(&mut state, 1.0), 2.5);
+    /// // 2.25 · 8 + 0.5 exceeds the limit by 8.5: the integral keeps its value.
+    /// assert_eq!(pi.update(&mut state, 8.0), 10.0);
+    /// assert_eq!((state.integral, state.excess), (0.5, 8.5));
+    /// ```
     #[derive(Debug, Clone, Copy, PartialEq)]
     pub struct Pi {
         /// K T/Ti.
@@ -57,12 +75,10 @@ impl Pi {
 }
 
 impl<N: SimdReal> Pi<N> {
-    /// Steps the controller by one cycle with an error; returns the limited output.
-    ///
-    /// Valid only for `scale` = 1, as in the current loop: the integral is not scaled.
+    /// Steps the controller by one cycle with an error; returns the scaled and limited output.
     #[inline(always)]
     pub fn update(&self, s: &mut PiState<N>, error: N) -> N {
-        self.output(s, error, s.integral, |unlimited| unlimited)
+        self.output(s, error, s.integral * self.scale, |unlimited| unlimited)
     }
 
     /// Steps the controller by one cycle with an error and a feedforward; returns the scaled and limited output.

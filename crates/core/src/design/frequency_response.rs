@@ -27,28 +27,15 @@ const LEAST_PEAK: f64 = 1e-6;
 /// Lowest and highest phase of the first value of a sampled response, rad: that of two integrators is near −π.
 const FIRST_PHASE: f64 = -1.5 * PI;
 
-/// Control loop of an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ControlLoop {
-    /// Current loop, sampled every Tsi: from the current setpoint to the current.
-    Current,
-    /// Velocity loop, sampled every Tsv: from the velocity setpoint to the speed of the motor.
-    Velocity,
-    /// Position loop, sampled every Tsp: from the delayed position setpoint to the position of the encoder.
-    Position,
-}
-
-impl ControlLoop {
-    /// All loops, from the innermost to the outermost.
-    pub const ALL: [ControlLoop; 3] = [ControlLoop::Current, ControlLoop::Velocity, ControlLoop::Position];
-
-    /// Returns the name: current, velocity or position.
-    pub fn name(self) -> &'static str {
-        match self {
-            ControlLoop::Current => "current",
-            ControlLoop::Velocity => "velocity",
-            ControlLoop::Position => "position",
-        }
+crate::named_values! {
+    /// Control loop of an axis, from the innermost to the outermost.
+    pub enum ControlLoop {
+        /// Current loop, sampled every Tsi: from the current setpoint to the current.
+        Current = "current",
+        /// Velocity loop, sampled every Tsv: from the velocity setpoint to the speed of the motor.
+        Velocity = "velocity",
+        /// Position loop, sampled every Tsp: from the delayed position setpoint to the position of the encoder.
+        Position = "position",
     }
 }
 

@@ -1,6 +1,6 @@
 //! Friction with presliding by elements in parallel (generalized Maxwell-slip model, GMS).
 
-use super::{Friction, Plant};
+use super::Friction;
 use crate::config::AxisConfig;
 use crate::state_codec::StateCodec;
 
@@ -164,9 +164,9 @@ impl MaxwellSlip {
         }
     }
 
-    /// Creates the model of an axis with its deviation over ticks of `period` seconds; `plant` is that of the axis
-    /// over the same period. Returns `None` for an axis without elements.
-    pub fn of_axis(axis: &AxisConfig, plant: &Plant, period: f64) -> Option<Self> {
+    /// Creates the model of an axis with its deviation over ticks of `period` seconds, in which a constant torque of 1 N·m
+    /// displaces the motor by `angle_per_torque`, rad. Returns `None` for an axis without elements.
+    pub fn of_axis(axis: &AxisConfig, angle_per_torque: f64, period: f64) -> Option<Self> {
         let presliding = axis.presliding.filter(|presliding| presliding.elements > 0)?;
         let deviation = axis.deviation.friction;
         // After a reversal the curve has twice the length of the first loading curve, with the same slope (Masing's rule), that
@@ -175,7 +175,7 @@ impl MaxwellSlip {
         let elements = MaxwellSlipElement::of_loading_curve(presliding.elements, stiffness);
         let (_, viscosity) = Friction::of_axis(axis, axis.motor.torque_constant * deviation).of_presliding();
         let attraction = presliding.attraction.map(|attraction| attraction * deviation);
-        Some(MaxwellSlip::new(&elements, attraction, viscosity, period, plant.angle_per_torque()))
+        Some(MaxwellSlip::new(&elements, attraction, viscosity, period, angle_per_torque))
     }
 
     /// Returns the elements.

@@ -1,10 +1,10 @@
 //! Kinematic chain and forward kinematics: joints to tool pose.
 
-use std::fmt;
+use nalgebra::{Unit, UnitQuaternion, Vector3};
 
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-
-use crate::config::{AxisKind, KinematicsConfig, MachineConfig};
+use super::role::AxisRole;
+use super::rotation::Rotation;
+use crate::config::MachineConfig;
 
 /// Pose of the tool in the workpiece frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,62 +15,10 @@ pub struct ToolPose {
     pub axis: Vector3<f64>,
 }
 
-/// Role of a joint in the kinematic chain.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AxisRole {
-    /// Linear axis that moves the tool along X.
-    X,
-    /// Linear axis that moves the tool along Y.
-    Y,
-    /// Linear axis that moves the tool along Z.
-    Z,
-    /// Tilting table that rotates the workpiece about X.
-    A,
-    /// Rotary table that rotates the workpiece about Z of the tilting table.
-    C,
-}
-
-impl AxisRole {
-    /// Linear roles, in the order of coordinates.
-    pub const LINEAR: [AxisRole; 3] = [AxisRole::X, AxisRole::Y, AxisRole::Z];
-    /// All roles.
-    pub const ALL: [AxisRole; 5] = [AxisRole::X, AxisRole::Y, AxisRole::Z, AxisRole::A, AxisRole::C];
-
-    /// Returns the joint name for the role.
-    pub fn name(self) -> &'static str {
-        match self {
-            AxisRole::X => "x",
-            AxisRole::Y => "y",
-            AxisRole::Z => "z",
-            AxisRole::A => "a",
-            AxisRole::C => "c",
-        }
-    }
-
-    /// Returns the axis type for the role.
-    pub fn kind(self) -> AxisKind {
-        match self {
-            AxisRole::X | AxisRole::Y | AxisRole::Z => AxisKind::Linear,
-            AxisRole::A | AxisRole::C => AxisKind::Rotary,
-        }
-    }
-
-    /// Returns true if a joint of this name and type can have the role; the first such joint of a machine has it.
-    pub fn matches(self, name: &str, kind: AxisKind) -> bool {
-        kind == self.kind() && name.eq_ignore_ascii_case(self.name())
-    }
-}
-
-impl fmt::Display for AxisRole {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
 /// Kinematics of a machine; the [module documentation](super) contains the equations.
 ///
-/// Name (`x`, `y`, `z`, `a`, `c`, in upper or lower case) and type of a joint determine its role. A role without joint
-/// is fixed at 0; a joint without role does not move the tool.
+/// Name (`x`, `y`, `z`, `a`, `b`, `c`, in upper or lower case) and type of a joint determine its role. A role without joint
+/// is fixed at 0; a joint without role, or a rotary joint that the chain does not contain, does not move the tool.
 ///
 /// ```
 /// use virtual_axes_core::config::Parameters;
@@ -84,94 +32,133 @@ impl fmt::Display for AxisRole {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kinematics {
-    pub(super) geometry: KinematicsConfig,
-    /// Joint index of each role, in the order of [`AxisRole`].
-    indices: [Option<usize>; AxisRole::ALL.len()],
+    /// Vector from the point moved by X, Y and Z to the tip with every axis at home, m.
+    pub(super) tool: Vector3<f64>,
+    /// Origin of the workpiece frame in the machine frame with every axis at home, m.
+    pub(super) workpiece: Vector3<f64>,
+    /// Joint indices of X, Y and Z.
+    pub(super) linear: [Option<usize>; 3],
+    /// Rotary axes from the workpiece to the tool.
+    rotations: [Rotation; 2],
     /// Number of joints of the machine.
     pub(super) joints: usize,
-    /// Travel limits of A, rad.
-    pub(super) travel_a: [f64; 2],
 }
 
 impl Kinematics {
     /// Creates the kinematics of a machine.
     pub fn new(config: &MachineConfig) -> Self {
-        let axes = config.axes();
-        let indices =
-            AxisRole::ALL.map(|role| axes.iter().position(|axis| role.matches(axis.name(), axis.kind())));
-        let travel_a = indices[AxisRole::A as usize].map(|index| axes[index].limits());
+        let (axes, geometry) = (config.axes(), config.kinematics());
+        let index = |role: AxisRole| axes.iter().position(|axis| role.matches(axis.name(), axis.kind()));
+        let with_travel = |role: AxisRole| {
+            let index = index(role)?;
+            let limits = axes[index].limits();
+            Some((index, [limits.travel_min, limits.travel_max]))
+        };
         Self {
-            geometry: *config.kinematics(),
-            indices,
+            tool: Vector3::new(0.0, 0.0, -geometry.tool_length),
+            workpiece: Vector3::from(geometry.workpiece),
+            linear: AxisRole::LINEAR.map(index),
+            rotations: Rotation::of_chain(geometry, with_travel),
             joints: axes.len(),
-            travel_a: travel_a
-                .map_or([f64::NEG_INFINITY, f64::INFINITY], |limits| [limits.travel_min, limits.travel_max]),
         }
+    }
+
+    /// Returns the kinematics with another tool, from the point moved by X, Y and Z to the tip with every axis at home, m.
+    #[must_use]
+    pub fn with_tool_length(&self, length: f64) -> Self {
+        Self { tool: Vector3::new(0.0, 0.0, -length), ..self.clone() }
     }
 
     /// Returns true if a joint moves the tool along X, Y or Z.
     pub fn has_linear_axis(&self) -> bool {
-        AxisRole::LINEAR.iter().any(|role| self.role(*role).is_some())
+        self.linear.iter().any(Option::is_some)
     }
 
-    /// Returns true if a joint rotates the workpiece.
+    /// Returns true if a joint rotates the workpiece or the tool.
     pub fn has_rotary_axis(&self) -> bool {
-        self.role(AxisRole::A).is_some() || self.role(AxisRole::C).is_some()
+        self.rotary_joints().next().is_some()
+    }
+
+    /// Returns the rotary axes, from the workpiece to the tool.
+    pub fn rotations(&self) -> &[Rotation; 2] {
+        &self.rotations
+    }
+
+    /// Returns the indices of the joints that rotate the workpiece or the tool.
+    pub fn rotary_joints(&self) -> impl Iterator<Item = usize> + '_ {
+        self.rotations.iter().filter_map(Rotation::joint)
     }
 
     /// Returns the index of the joint with the role, in the order of `joints` of the machine.
     pub fn role(&self, role: AxisRole) -> Option<usize> {
-        self.indices[role as usize]
+        match AxisRole::LINEAR.iter().position(|linear| *linear == role) {
+            Some(coordinate) => self.linear[coordinate],
+            None => self.rotations.iter().find(|rotation| rotation.role() == role)?.joint(),
+        }
     }
 
-    /// Returns the value of the joint with the role, 0 if there is none.
-    pub(super) fn value(&self, joints: &[f64], role: AxisRole) -> f64 {
+    /// Returns the positions of X, Y and Z, 0 for a missing one.
+    pub(super) fn linear_of(&self, joints: &[f64]) -> Vector3<f64> {
         debug_assert_eq!(joints.len(), self.joints, "one value for each joint");
-        self.role(role).and_then(|index| joints.get(index)).copied().unwrap_or(0.0)
+        Vector3::from(self.linear.map(|joint| value(joints, joint)))
     }
 
-    fn tables_at(&self, joints: &[f64]) -> Tables<'_> {
-        self.tables(self.value(joints, AxisRole::A), self.value(joints, AxisRole::C))
-    }
-
-    /// Returns the tables at the angles a and c, rad.
-    pub(super) fn tables(&self, a: f64, c: f64) -> Tables<'_> {
-        Tables { geometry: &self.geometry, a: a.sin_cos(), c: c.sin_cos() }
+    /// Returns the angles of the rotary axes, rad, 0 for a missing one.
+    pub(super) fn angles_of(&self, joints: &[f64]) -> [f64; 2] {
+        self.rotations.each_ref().map(|rotation| value(joints, rotation.joint()))
     }
 
     /// Returns the tool pose (forward kinematics). `joints` contains one value per joint of the machine, m or rad.
     pub fn forward(&self, joints: &[f64]) -> ToolPose {
-        self.forward_cached(&mut TableAngles::default(), joints)
+        self.forward_cached(&mut RotaryAngles::default(), joints)
     }
 
-    /// Returns the tool pose, see [`forward`](Self::forward). `table_angles` caches sines and cosines between calls.
-    pub fn forward_cached(&self, table_angles: &mut TableAngles, joints: &[f64]) -> ToolPose {
-        let tables = self
-            .tables_cached(table_angles, [self.value(joints, AxisRole::A), self.value(joints, AxisRole::C)]);
-        let linear = AxisRole::LINEAR.map(|role| self.value(joints, role));
-        ToolPose { tip: tables.tip(Vector3::from(linear)), axis: tables.tool_axis() }
+    /// Returns the tool pose, see [`forward`](Self::forward). `angles` caches sines and cosines between calls.
+    pub fn forward_cached(&self, angles: &mut RotaryAngles, joints: &[f64]) -> ToolPose {
+        let sin_cos = angles.at(self.angles_of(joints));
+        ToolPose { tip: self.tip(self.linear_of(joints), &sin_cos), axis: self.tool_axis(&sin_cos) }
     }
 
-    /// Returns the tables at `angles` (rad), and updates the cache.
-    #[inline]
-    pub(super) fn tables_cached(&self, table_angles: &mut TableAngles, angles: [f64; 2]) -> Tables<'_> {
-        table_angles.update(angles);
-        let [a, c] = table_angles.sin_cos;
-        Tables { geometry: &self.geometry, a, c }
+    /// Returns the tool axis. Each component has full relative accuracy.
+    #[inline(always)]
+    pub(super) fn tool_axis(&self, sin_cos: &[(f64, f64); 2]) -> Vector3<f64> {
+        let turns = self.rotations.iter().zip(sin_cos).rev();
+        turns.fold(Vector3::z(), |axis, (rotation, sin_cos)| rotation.turned(axis, *sin_cos))
     }
 
-    /// Returns the orientation of the tool frame in the workpiece frame, `Rz(c) Rx(a)`. Its Z axis is the tool axis.
+    /// Returns the tip in the workpiece frame for X, Y and Z at `linear`, m.
+    fn tip(&self, linear: Vector3<f64>, sin_cos: &[(f64, f64); 2]) -> Vector3<f64> {
+        let tables = self.rotations.iter().zip(sin_cos).rev().filter(|(rotation, _)| !rotation.is_head());
+        let point = linear + self.tool_vector(sin_cos);
+        tables.fold(point, |point, (rotation, sin_cos)| rotation.turned_point(point, *sin_cos))
+            - self.workpiece
+    }
+
+    /// Returns X, Y and Z for a tip in the workpiece frame, m. It is the inverse of [`tip`](Self::tip).
+    pub(super) fn linear_joints(&self, tip: Vector3<f64>, sin_cos: &[(f64, f64); 2]) -> Vector3<f64> {
+        let tables = self.rotations.iter().zip(sin_cos).filter(|(rotation, _)| !rotation.is_head());
+        let point = self.workpiece + tip;
+        tables.fold(point, |point, (rotation, sin_cos)| rotation.turned_back(point, *sin_cos))
+            - self.tool_vector(sin_cos)
+    }
+
+    /// Returns the vector from the point moved by X, Y and Z to the tip, m.
+    fn tool_vector(&self, sin_cos: &[(f64, f64); 2]) -> Vector3<f64> {
+        let heads = self.rotations.iter().zip(sin_cos).rev().filter(|(rotation, _)| rotation.is_head());
+        heads.fold(self.tool, |point, (rotation, sin_cos)| rotation.turned_point(point, *sin_cos))
+    }
+
+    /// Returns the orientation of the tool frame in the workpiece frame, the product of the rotations in the order of the
+    /// chain, `Rz(c) Rx(a)` with tables C and A. Its Z axis is the tool axis.
     ///
     /// The quaternion is continuous in the joints. A full turn of C negates it, which is the same orientation.
     pub fn orientation(&self, joints: &[f64]) -> UnitQuaternion<f64> {
-        let (sin_a, cos_a) = (0.5 * self.value(joints, AxisRole::A)).sin_cos();
-        let (sin_c, cos_c) = (0.5 * self.value(joints, AxisRole::C)).sin_cos();
-        UnitQuaternion::new_unchecked(Quaternion::new(
-            cos_c * cos_a,
-            cos_c * sin_a,
-            sin_c * sin_a,
-            sin_c * cos_a,
-        ))
+        let [first, second] = [0, 1].map(|place| {
+            let rotation = &self.rotations[place];
+            let axis = Unit::new_unchecked(rotation.direction());
+            UnitQuaternion::from_axis_angle(&axis, value(joints, rotation.joint()))
+        });
+        first * second
     }
 
     /// Converts tool center point (TCP) coordinates to joints, in place: x, y and z from tip coordinates in the workpiece
@@ -179,14 +166,14 @@ impl Kinematics {
     ///
     /// On a machine without one of x, y and z, the tip has the coordinate of the home position there.
     pub fn tip_to_joints(&self, coordinates: &mut [f64]) {
-        let home = -self.tool_vector() - Vector3::from(self.geometry.workpiece);
-        let mut tip = home;
-        for (coordinate, role) in tip.iter_mut().zip(AxisRole::LINEAR) {
-            if self.role(role).is_some() {
-                *coordinate = self.value(coordinates, role);
+        let mut tip = self.tool - self.workpiece;
+        for (coordinate, joint) in tip.iter_mut().zip(self.linear) {
+            if joint.is_some() {
+                *coordinate = value(coordinates, joint);
             }
         }
-        let linear = self.tables_at(coordinates).linear_joints(tip);
+        let sin_cos = self.angles_of(coordinates).map(f64::sin_cos);
+        let linear = self.linear_joints(tip, &sin_cos);
         self.set_linear(linear, coordinates);
     }
 
@@ -202,111 +189,57 @@ impl Kinematics {
         self.set_linear(tip, coordinates);
     }
 
-    /// Sets the values of the joints with linear roles.
-    fn set_linear(&self, values: Vector3<f64>, joints: &mut [f64]) {
-        for (value, role) in values.iter().zip(AxisRole::LINEAR) {
-            self.set(role, *value, joints);
+    /// Sets the values of the linear joints.
+    pub(super) fn set_linear(&self, values: Vector3<f64>, joints: &mut [f64]) {
+        for (value, joint) in values.iter().zip(self.linear) {
+            set(joint, *value, joints);
         }
     }
 
-    /// Sets the value of the joint with the role, if there is one.
-    pub(super) fn set(&self, role: AxisRole, value: f64, joints: &mut [f64]) {
-        if let Some(joint) = self.role(role).and_then(|index| joints.get_mut(index)) {
-            *joint = value;
+    /// Sets the values of the rotary joints, rad.
+    pub(super) fn set_angles(&self, angles: [f64; 2], joints: &mut [f64]) {
+        for (angle, rotation) in angles.into_iter().zip(&self.rotations) {
+            set(rotation.joint(), angle, joints);
         }
     }
+}
 
-    fn tool_vector(&self) -> Vector3<f64> {
-        tool_vector(&self.geometry)
+/// Returns the value of a joint, 0 if there is none.
+fn value(joints: &[f64], joint: Option<usize>) -> f64 {
+    joint.and_then(|joint| joints.get(joint)).copied().unwrap_or(0.0)
+}
+
+/// Sets the value of a joint, if there is one.
+fn set(joint: Option<usize>, value: f64, joints: &mut [f64]) {
+    if let Some(joint) = joint.and_then(|joint| joints.get_mut(joint)) {
+        *joint = value;
     }
 }
 
-/// Returns the vector from the tip to the point moved by X, Y and Z, machine frame, m.
-#[inline(always)]
-fn tool_vector(geometry: &KinematicsConfig) -> Vector3<f64> {
-    Vector3::new(0.0, 0.0, geometry.tool_length)
-}
-
-/// Table angles with their cached sines and cosines. Most paths move only one table or none.
+/// Angles of the rotary axes with their cached sines and cosines. Most paths move only one of them or none.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TableAngles {
-    /// Angles a and c, rad.
+pub struct RotaryAngles {
+    /// Angles in the order of the chain, rad.
     angles: [f64; 2],
     sin_cos: [(f64, f64); 2],
 }
 
-impl Default for TableAngles {
+impl Default for RotaryAngles {
     /// Returns both angles at 0.
     fn default() -> Self {
-        TableAngles { angles: [0.0; 2], sin_cos: [(0.0, 1.0); 2] }
+        RotaryAngles { angles: [0.0; 2], sin_cos: [(0.0, 1.0); 2] }
     }
 }
 
-impl TableAngles {
-    fn update(&mut self, angles: [f64; 2]) {
+impl RotaryAngles {
+    /// Updates the cache to `angles`, rad, and returns their sines and cosines.
+    pub(super) fn at(&mut self, angles: [f64; 2]) -> [(f64, f64); 2] {
         for ((angle, sin_cos), next) in self.angles.iter_mut().zip(&mut self.sin_cos).zip(angles) {
             // The sine of −0 differs from that of 0.
             if angle.to_bits() != next.to_bits() {
                 (*angle, *sin_cos) = (next, next.sin_cos());
             }
         }
-    }
-}
-
-/// Tilting and rotary table at given angles.
-pub(super) struct Tables<'a> {
-    geometry: &'a KinematicsConfig,
-    /// Sine and cosine of a.
-    a: (f64, f64),
-    /// Sine and cosine of c.
-    c: (f64, f64),
-}
-
-impl<'a> Tables<'a> {
-    /// Returns sine and cosine of a and c.
-    pub(super) fn sin_cos(&self) -> [(f64, f64); 2] {
-        [self.a, self.c]
-    }
-
-    /// Returns the tables at other sines and cosines of a and c.
-    #[inline(always)]
-    pub(super) fn with_sin_cos(&self, a: (f64, f64), c: (f64, f64)) -> Tables<'a> {
-        Tables { geometry: self.geometry, a, c }
-    }
-
-    /// Returns the tool axis u = (sin a sin c, −sin a cos c, cos a). Each component has full relative accuracy.
-    #[inline(always)]
-    pub(super) fn tool_axis(&self) -> Vector3<f64> {
-        let ((sin_a, cos_a), (sin_c, cos_c)) = (self.a, self.c);
-        Vector3::new(sin_a * sin_c, -sin_a * cos_c, cos_a)
-    }
-
-    /// Returns the tip in the workpiece frame for X, Y and Z at `linear`, m.
-    #[inline(always)]
-    pub(super) fn tip(&self, linear: Vector3<f64>) -> Vector3<f64> {
-        let ([pivot_a, pivot_c, workpiece], (sin_a, cos_a), (sin_c, cos_c)) = (self.points(), self.a, self.c);
-        let p = linear - tool_vector(self.geometry) - pivot_a;
-        let p = Vector3::new(p.x, cos_a * p.y - sin_a * p.z, sin_a * p.y + cos_a * p.z) + pivot_a - pivot_c;
-        Vector3::new(cos_c * p.x - sin_c * p.y, sin_c * p.x + cos_c * p.y, p.z) + pivot_c - workpiece
-    }
-
-    /// Returns X, Y and Z for a tip in the workpiece frame, m. It is the inverse of [`tip`](Self::tip).
-    pub fn linear_joints(&self, tip: Vector3<f64>) -> Vector3<f64> {
-        let ([pivot_a, pivot_c, workpiece], (sin_a, cos_a), (sin_c, cos_c)) = (self.points(), self.a, self.c);
-        let p = workpiece + tip - pivot_c;
-        let p = Vector3::new(cos_c * p.x + sin_c * p.y, cos_c * p.y - sin_c * p.x, p.z) + pivot_c - pivot_a;
-        let p = Vector3::new(p.x, cos_a * p.y + sin_a * p.z, cos_a * p.z - sin_a * p.y);
-        p + pivot_a + tool_vector(self.geometry)
-    }
-
-    /// Returns Pa, Pc and W, m.
-    #[inline(always)]
-    fn points(&self) -> [Vector3<f64>; 3] {
-        let KinematicsConfig { pivot_a, pivot_c, workpiece, .. } = *self.geometry;
-        [
-            Vector3::new(0.0, pivot_a[0], pivot_a[1]),
-            Vector3::new(pivot_c[0], pivot_c[1], 0.0),
-            Vector3::from(workpiece),
-        ]
+        self.sin_cos
     }
 }

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::chain::AxisRole;
+use super::role::AxisRole;
 use crate::units::Rounded;
 
 /// Rejection of a pose by the inverse kinematics.

@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::chain::{AxisRole, Kinematics, TableAngles, Tables, ToolPose};
-use crate::simd::{AlignedBuffer, LANES, SliceOperation, vectorize};
+use super::chain::{Kinematics, RotaryAngles, ToolPose};
+use super::rotation::Rotation;
+use crate::simd::{LANES, SliceOperation, vectorize};
 
 /// Largest distance of an angle from the middle one, rad, up to which sines and cosines are computed by power series.
 const SERIES_LIMIT: f64 = 0.0625;
@@ -11,14 +12,15 @@ const SERIES_LIMIT: f64 = 0.0625;
 /// Tool poses at consecutive instants, as structure of arrays.
 #[derive(Debug, Clone, Default)]
 pub struct Poses {
-    /// X, Y and Z of the tips, m, workpiece frame.
-    tips: [AlignedBuffer; 3],
+    count: usize,
+    /// X, Y and Z of the tips, m, workpiece frame; all columns are filled up to whole vectors.
+    tips: [Vec<f64>; 3],
     /// Components of the tool axes.
-    axes: [AlignedBuffer; 3],
-    /// True if the tables do not move.
+    axes: [Vec<f64>; 3],
+    /// True if the rotary axes do not move.
     has_constant_axis: bool,
-    /// Sines and cosines of A and C at each instant.
-    angles: [[AlignedBuffer; 2]; 2],
+    /// Sines and cosines of the rotary axes at each instant, in the order of the chain.
+    angles: [[Vec<f64>; 2]; 2],
 }
 
 /// Returns true if all values are bit-identical.
@@ -30,9 +32,19 @@ fn are_equal(values: &[f64]) -> bool {
 }
 
 impl Poses {
+    /// Creates the series of one pose.
+    pub fn of(pose: &ToolPose) -> Self {
+        let mut poses = Poses { has_constant_axis: true, ..Poses::default() };
+        poses.resize(1);
+        for axis in 0..3 {
+            (poses.tips[axis][0], poses.axes[axis][0]) = (pose.tip[axis], pose.axis[axis]);
+        }
+        poses
+    }
+
     /// Returns the number of poses.
     pub fn len(&self) -> usize {
-        self.tips[0].len()
+        self.count
     }
 
     /// Returns true if there are no poses.
@@ -42,18 +54,12 @@ impl Poses {
 
     /// Returns X, Y and Z of the tips, m, workpiece frame.
     pub fn tips(&self) -> [&[f64]; 3] {
-        self.tips.each_ref().map(|values| &**values)
+        self.tips.each_ref().map(|values| &values[..self.count])
     }
 
     /// Returns the components of the tool axes in the workpiece frame.
     pub fn axes(&self) -> [&[f64]; 3] {
-        self.axes.each_ref().map(|values| &**values)
-    }
-
-    /// Returns X, Y and Z of the tips, m, workpiece frame, in vectors; those beyond the last pose are undetermined.
-    #[inline(always)]
-    pub(crate) fn tip_lanes(&self) -> [&[[f64; LANES]]; 3] {
-        self.tips.each_ref().map(AlignedBuffer::lanes)
+        self.axes.each_ref().map(|values| &values[..self.count])
     }
 
     /// Returns the tip at `instant`, m, workpiece frame.
@@ -74,7 +80,7 @@ impl Poses {
         ToolPose { tip: self.tip(instant), axis }
     }
 
-    /// Returns the common tool axis if the tables do not move.
+    /// Returns the common tool axis if the rotary axes do not move.
     pub fn constant_axis(&self) -> Option<Vector3<f64>> {
         (self.has_constant_axis && !self.is_empty()).then(|| self.get(0).axis)
     }
@@ -87,8 +93,9 @@ impl Poses {
     /// Sets the number of poses; their values are undetermined.
     fn resize(&mut self, instants: usize) {
         let angles = self.angles.iter_mut().flatten();
+        self.count = instants;
         for values in self.tips.iter_mut().chain(&mut self.axes).chain(angles) {
-            values.resize(instants);
+            values.resize(instants.next_multiple_of(LANES), 0.0);
         }
     }
 }
@@ -97,54 +104,36 @@ impl Kinematics {
     /// Computes the tool poses at `instants` consecutive instants. `joints` contains the values of the first joint at all
     /// instants, then those of the next joint, m or rad.
     ///
-    /// Sines and cosines of the tables are within 2·10⁻¹⁶ of those of [`forward_cached`](Self::forward_cached), so the
-    /// tip is within 10⁻¹⁵ of it relative to the size of the machine. While a table does not move, they are identical.
+    /// Sines and cosines of the rotary axes are within 2·10⁻¹⁶ of those of [`forward_cached`](Self::forward_cached), so the
+    /// tip is within 10⁻¹⁵ of it relative to the size of the machine. While an axis does not move, they are identical.
     pub fn forward_batch(
         &self,
-        table_angles: &mut TableAngles,
+        angles: &mut RotaryAngles,
         joints: &[f64],
         instants: usize,
         poses: &mut Poses,
     ) {
         debug_assert_eq!(joints.len(), self.joints * instants, "one value for each joint and instant");
-        let of = |role: AxisRole| {
-            let index = self.role(role)?;
-            joints.get(index * instants..(index + 1) * instants)
-        };
+        let of = |joint: Option<usize>| joints.get(joint? * instants..(joint? + 1) * instants);
         poses.resize(instants);
         if instants == 0 {
             return;
         }
-        for (tips, role) in poses.tips.iter_mut().zip(AxisRole::LINEAR) {
-            match of(role) {
-                Some(values) => tips.copy_from_slice(values),
-                None => tips.fill(0.0),
-            }
-        }
-        let tables = [of(AxisRole::A), of(AxisRole::C)];
-        poses.has_constant_axis = tables.into_iter().flatten().all(are_equal);
-        let middle = tables.map(|values| values.map_or(0.0, |values| values[instants / 2]));
-        let center = self.tables_cached(table_angles, middle);
-        if poses.has_constant_axis {
-            vectorize(FixedTables { tables: center, poses });
-            return;
-        }
+        let rotary = self.rotations().each_ref().map(|rotation| of(rotation.joint()));
+        poses.has_constant_axis = rotary.into_iter().flatten().all(are_equal);
+        let middle = rotary.map(|values| values.map_or(0.0, |values| values[instants / 2]));
+        let center = angles.at(middle);
         for (((values, sin_cos), middle), angles) in
-            tables.into_iter().zip(center.sin_cos()).zip(middle).zip(&mut poses.angles)
+            rotary.into_iter().zip(center).zip(middle).zip(&mut poses.angles)
         {
-            write_sines(values, middle, sin_cos, angles);
+            write_sines(values, middle, sin_cos, angles.each_mut().map(|values| &mut values[..instants]));
         }
-        vectorize(MovingTables { center, poses });
+        vectorize(PoseSeries { kinematics: self, linear: self.linear.map(of), center, poses });
     }
 }
 
 /// Writes sines and cosines of the angles `values`, rad; `sin_cos` are those of the angle `middle`.
-fn write_sines(
-    values: Option<&[f64]>,
-    middle: f64,
-    sin_cos: (f64, f64),
-    [sines, cosines]: &mut [AlignedBuffer; 2],
-) {
+fn write_sines(values: Option<&[f64]>, middle: f64, sin_cos: (f64, f64), [sines, cosines]: [&mut [f64]; 2]) {
     let is_series = values.is_some_and(|values| {
         vectorize(SineSeries { values, middle, sin_cos, sines: &mut *sines, cosines: &mut *cosines })
     });
@@ -190,63 +179,72 @@ impl SliceOperation for SineSeries<'_> {
     }
 }
 
-/// Computation of poses with fixed tables.
-struct FixedTables<'a> {
-    tables: Tables<'a>,
-    /// Poses whose tips contain X, Y and Z.
+/// Computation of poses from the sines and cosines of each instant.
+struct PoseSeries<'a> {
+    kinematics: &'a Kinematics,
+    /// Positions of X, Y and Z, m; `None` is 0.
+    linear: [Option<&'a [f64]>; 3],
+    /// Sines and cosines in the middle.
+    center: [(f64, f64); 2],
     poses: &'a mut Poses,
 }
 
-impl SliceOperation for FixedTables<'_> {
+impl SliceOperation for PoseSeries<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let FixedTables { tables, poses } = self;
-        let axis = tables.tool_axis();
-        for (values, component) in poses.axes.iter_mut().zip(&axis) {
+        let PoseSeries { kinematics, linear, center, poses } = self;
+        let Poses { count, tips, axes, angles, has_constant_axis } = poses;
+        let mut tips = tips.each_mut().map(|values| &mut values[..*count]);
+        let mut axes = axes.each_mut().map(|values| &mut values[..*count]);
+        let angles = angles.each_ref().map(|pair| pair.each_ref().map(|values| &values[..*count]));
+        let chain = || kinematics.rotations().iter().zip(angles).rev();
+        for (values, start) in tips.iter_mut().zip(&kinematics.tool) {
+            values.fill(*start);
+        }
+        for (rotation, angles) in chain().filter(|(rotation, _)| rotation.is_head()) {
+            turn(&mut tips, rotation, rotation.pivot(), angles);
+        }
+        for (values, linear) in tips.iter_mut().zip(linear) {
+            for (value, linear) in values.iter_mut().zip(linear.unwrap_or_default()) {
+                *value += linear;
+            }
+        }
+        for (rotation, angles) in chain().filter(|(rotation, _)| !rotation.is_head()) {
+            turn(&mut tips, rotation, rotation.pivot(), angles);
+        }
+        for (values, origin) in tips.iter_mut().zip(&kinematics.workpiece) {
+            values.iter_mut().for_each(|value| *value -= origin);
+        }
+        let axis = if *has_constant_axis { kinematics.tool_axis(&center) } else { Vector3::z() };
+        for (values, component) in axes.iter_mut().zip(&axis) {
             values.fill(*component);
         }
-        let count = poses.len();
-        let [xs, ys, zs] = poses.tips.each_mut().map(|values| &mut values[..count]);
-        for index in 0..count {
-            let tip = tables.tip(Vector3::new(xs[index], ys[index], zs[index]));
-            (xs[index], ys[index], zs[index]) = (tip.x, tip.y, tip.z);
+        if !*has_constant_axis {
+            for (rotation, angles) in chain() {
+                turn(&mut axes, rotation, Vector3::zeros(), angles);
+            }
         }
     }
 }
 
-/// Computation of poses at the sines and cosines of each instant.
-struct MovingTables<'a> {
-    center: Tables<'a>,
-    /// Poses whose tips contain X, Y and Z.
-    poses: &'a mut Poses,
-}
-
-impl SliceOperation for MovingTables<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let MovingTables { center, poses } = self;
-        let count = poses.len().div_ceil(LANES);
-        let [xs, ys, zs] = poses.tips.each_mut().map(|values| &mut values.lanes_mut()[..count]);
-        let [us, vs, ws] = poses.axes.each_mut().map(|values| &mut values.lanes_mut()[..count]);
-        let [[sin_a, cos_a], [sin_c, cos_c]] =
-            poses.angles.each_ref().map(|pair| pair.each_ref().map(|values| &values.lanes()[..count]));
-        for part in 0..count {
-            let (x, y, z) = (xs[part], ys[part], zs[part]);
-            let (sin_a, cos_a, sin_c, cos_c) = (sin_a[part], cos_a[part], sin_c[part], cos_c[part]);
-            let (mut tips, mut axes) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
-            for k in 0..LANES {
-                let tables = center.with_sin_cos((sin_a[k], cos_a[k]), (sin_c[k], cos_c[k]));
-                let tip = tables.tip(Vector3::new(x[k], y[k], z[k]));
-                (tips[0][k], tips[1][k], tips[2][k]) = (tip.x, tip.y, tip.z);
-                let axis = tables.tool_axis();
-                (axes[0][k], axes[1][k], axes[2][k]) = (axis.x, axis.y, axis.z);
-            }
-            [xs[part], ys[part], zs[part]] = tips;
-            [us[part], vs[part], ws[part]] = axes;
-        }
+/// Rotates the points with the coordinates `columns` about `pivot` by the angles with these sines and cosines.
+#[inline(always)]
+fn turn(
+    columns: &mut [&mut [f64]; 3],
+    rotation: &Rotation,
+    pivot: Vector3<f64>,
+    [sines, cosines]: [&[f64]; 2],
+) {
+    let [i, j] = rotation.plane();
+    let Ok([first, second]) = columns.get_disjoint_mut([i, j]) else { return };
+    let (pivot_i, pivot_j) = (pivot[i], pivot[j]);
+    let count = sines.len();
+    let (first, second, cosines) = (&mut first[..count], &mut second[..count], &cosines[..count]);
+    for k in 0..count {
+        let (u, v) = (first[k] - pivot_i, second[k] - pivot_j);
+        first[k] = cosines[k] * u - sines[k] * v + pivot_i;
+        second[k] = sines[k] * u + cosines[k] * v + pivot_j;
     }
 }

@@ -18,10 +18,11 @@ use crate::units::seconds;
 use super::compensation::FrictionCompensation;
 use super::controller::{create_position_controller, feedforward_config};
 use super::coupling::CouplingTorques;
+use super::error::AxisError;
 use super::inner_loops::{
     DriveFeedback, InnerLoopInputs, InnerLoopState, InnerLoops, TickRecord, ZeroOrderHold,
 };
-use super::{AxisError, AxisSample};
+use super::sample::AxisSample;
 
 /// Immutable parameters of one axis: plant, controllers and delays.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,7 +113,7 @@ impl AxisParameters {
     pub fn new(axis: &AxisConfig, periods: &Periods) -> Result<Self, AxisError> {
         let motor = &axis.motor;
         let (tick, ticks) = (seconds(periods.current), periods.ticks_per_position());
-        let (position, controller) = create_position_controller(axis, periods)?;
+        let position = create_position_controller(axis, periods)?;
         let delays = Delays::new(&axis.delays, periods.current);
         let compensation = FrictionCompensation::new(axis, periods, delays.friction);
         // Without friction compensation its delay does not count.
@@ -135,9 +136,9 @@ impl AxisParameters {
                 current: Pi::new(&axis.current_loop, tick, 1.0, motor.max_voltage),
             },
             event_driven: EventDrivenTransmission::new(axis, tick)?.map(Arc::new),
-            elements: MaxwellSlip::of_axis(axis, &plant, tick).map(Arc::new),
+            elements: MaxwellSlip::of_axis(axis, plant.angle_per_torque(), tick).map(Arc::new),
             backlash_compensation: BacklashCompensation::new(axis, seconds(periods.position)),
-            controller,
+            controller: axis.position_loop.controller.name(),
             feedforward: Feedforward::new(
                 &feedforward_config(axis),
                 seconds(periods.position),
@@ -164,9 +165,6 @@ impl AxisParameters {
         })
     }
 }
-
-/// State of motor and load; that of the load is 0 for a rigid axis.
-pub(super) type DriveState = (MotorState, LoadState);
 
 /// State of one axis outside the inner loops, and its last sample.
 #[derive(Debug, Clone, PartialEq)]

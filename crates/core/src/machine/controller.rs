@@ -43,23 +43,19 @@ pub fn design_controller(axis: &AxisConfig, model: &PredictionModel) -> Result<R
     }
 }
 
-/// Creates the position controller of an axis; returns it with its name as in `position_loop.controller`.
+/// Creates the position controller of an axis.
 pub(super) fn create_position_controller(
     axis: &AxisConfig,
     periods: &Periods,
-) -> Result<(PositionController, &'static str), AxisError> {
+) -> Result<PositionController, AxisError> {
     let (gain, period) = (axis.position_loop.gain, seconds(periods.position));
     let transfer = BumplessTransfer {
         max_step: axis.limits.acceleration * period / axis.transmission_ratio,
         cycles: (TRANSFER_DURATION / periods.position) as u32,
     };
-    let name = match &axis.position_loop.controller {
-        PositionControllerConfig::Cascade => {
-            return Ok((PositionController::proportional(gain, transfer), "cascade"));
-        }
-        PositionControllerConfig::Gpc(_) => "gpc",
-        PositionControllerConfig::Rst(_) => "rst",
-    };
+    if axis.position_loop.controller == PositionControllerConfig::Cascade {
+        return Ok(PositionController::proportional(gain, transfer));
+    }
     let model = prediction_model(axis, periods)?;
     let rst = require_stable(&model, design_controller(axis, &model)?, axis.position_loop.allow_unstable)?;
     let standstill_tolerance = match axis.kind {
@@ -72,7 +68,7 @@ pub(super) fn create_position_controller(
         standstill_cycles: (FALLBACK_DELAY / periods.position) as u32,
         standstill_tolerance: standstill_tolerance / axis.transmission_ratio,
     };
-    Ok((PositionController::rst(rst, fallback, transfer), name))
+    Ok(PositionController::rst(rst, fallback, transfer))
 }
 
 /// Returns the feedforward weights of an axis: VFFW and TFFW apply to the cascade only, an RST controller contains its

@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use pulp::Simd;
 
-use super::inner_loops::Aligned;
 use crate::drive::{MaxwellSlip, MaxwellSlipState};
-use crate::simd::{SimdLoad, soa_struct};
+use crate::simd::{Aligned, LANES, SimdLoad, soa_struct};
 use crate::state_codec::StateCodec;
 
 soa_struct! {
@@ -26,20 +25,24 @@ soa_struct! {
     }
 }
 
-/// Elements of the friction of `L` axes, and their states.
+/// Elements of the friction of the axes of a block, and their states.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Elements<const L: usize> {
+pub(super) struct Elements {
     /// Models of the axes with elements.
-    models: [Option<Arc<MaxwellSlip>>; L],
-    pub states: [MaxwellSlipState; L],
+    models: [Option<Arc<MaxwellSlip>>; LANES],
+    pub states: [MaxwellSlipState; LANES],
     /// True if any axis has elements.
     pub is_present: bool,
 }
 
-impl<const L: usize> Elements<L> {
+impl Elements {
     /// Creates the elements of a block whose axes have none.
     pub fn none() -> Self {
-        Elements { models: [const { None }; L], states: [MaxwellSlipState::default(); L], is_present: false }
+        Elements {
+            models: [const { None }; LANES],
+            states: [MaxwellSlipState::default(); LANES],
+            is_present: false,
+        }
     }
 
     /// Sets the model of a lane; the forces of the elements that it has remain.
@@ -67,7 +70,7 @@ impl<const L: usize> Elements<L> {
         [free, law]: [N; 2],
         (by_friction, deflection): (N, N),
     ) -> (N, N) {
-        let mut rows: Aligned<ElementsStep<[f64; L]>> = Aligned(ElementsStep::default().fill());
+        let mut rows: Aligned<ElementsStep<[f64; LANES]>> = Aligned(ElementsStep::default().fill());
         rows.0.store(index, &ElementsStep { speed, free, law, by_friction, deflection });
         for lane in index * N::LANES..(index + 1) * N::LANES {
             if let Some(model) = &self.models[lane] {

@@ -15,7 +15,7 @@ use crate::drive::{
     ContactState, EventDrivenTransmission, FrictionExpansion, GravityExpansion, LoadState, MaxwellSlip,
     MaxwellSlipState, MotorState, Plant,
 };
-use crate::simd::{SimdLoad, SimdReal, Unroll2, Vector, soa_struct};
+use crate::simd::{Aligned, LANES, SimdLoad, SimdReal, Unroll2, Vector, soa_struct};
 use crate::state_codec::StateCodec;
 
 soa_struct! {
@@ -147,11 +147,6 @@ soa_struct! {
     }
 }
 
-/// Value aligned to a cache line of 64 bytes, the size of the largest SIMD vector.
-#[derive(Debug, Clone, PartialEq)]
-#[repr(align(64))]
-pub(super) struct Aligned<T>(pub T);
-
 /// Aligns the stack frame of the calling function to 64 bytes; returns the address of a local aligned that way.
 ///
 /// The compiler aligns a stack frame as its most aligned local requires. SIMD vectors that are spilled to an aligned
@@ -209,40 +204,45 @@ pub(super) struct DriveFeedback {
     pub max_current_excess: f64,
 }
 
+/// State of motor and load; that of the load is 0 for a rigid axis.
+pub(super) type DriveState = (MotorState, LoadState);
+
 /// State of a block at the start of a tick.
 #[derive(Debug, Clone, PartialEq)]
-struct TickStart<const L: usize> {
-    state: Aligned<InnerLoopState<[f64; L]>>,
-    friction_expansion: Aligned<FrictionExpansion<[f64; L]>>,
-    gravity_expansion: Aligned<GravityExpansion<[f64; L]>>,
-    span_state: Aligned<SpanState<[f64; L]>>,
-    elements: Elements<L>,
+struct TickStart {
+    state: Aligned<InnerLoopState<[f64; LANES]>>,
+    friction_expansion: Aligned<FrictionExpansion<[f64; LANES]>>,
+    gravity_expansion: Aligned<GravityExpansion<[f64; LANES]>>,
+    span_state: Aligned<SpanState<[f64; LANES]>>,
+    elements: Elements,
 }
 
-/// Parameters, inputs, state and results of `L` axes, one per SIMD lane.
+/// Parameters, inputs, state and results of up to [`LANES`] axes, one per SIMD lane.
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
-pub(super) struct AxisBlock<const L: usize> {
-    loops: Aligned<InnerLoops<[f64; L]>>,
-    state: Aligned<InnerLoopState<[f64; L]>>,
-    inputs: Aligned<InnerLoopInputs<[f64; L]>>,
+pub(super) struct AxisBlock {
+    /// Number of axes; the other lanes repeat the first one.
+    axes: usize,
+    loops: Aligned<InnerLoops<[f64; LANES]>>,
+    state: Aligned<InnerLoopState<[f64; LANES]>>,
+    inputs: Aligned<InnerLoopInputs<[f64; LANES]>>,
     /// Expansions of the friction laws near the present speeds.
-    friction_expansion: Aligned<FrictionExpansion<[f64; L]>>,
+    friction_expansion: Aligned<FrictionExpansion<[f64; LANES]>>,
     /// Expansions of gravity near the present angles.
-    gravity_expansion: Aligned<GravityExpansion<[f64; L]>>,
-    pub statistics: Aligned<CycleStatistics<[f64; L]>>,
+    gravity_expansion: Aligned<GravityExpansion<[f64; LANES]>>,
+    pub statistics: Aligned<CycleStatistics<[f64; LANES]>>,
     /// Values to continue within a position cycle.
-    span_state: Aligned<SpanState<[f64; L]>>,
+    span_state: Aligned<SpanState<[f64; LANES]>>,
     /// True if gravity of any axis depends on its position.
     has_tilting_axis: bool,
     /// True if the transmission of any axis is elastic.
     has_elastic_axis: bool,
     /// Transmissions of the axes with backlash, friction at the load or a structure.
-    event_driven: [Option<Arc<EventDrivenTransmission>>; L],
+    event_driven: [Option<Arc<EventDrivenTransmission>>; LANES],
     /// True if there is an event-driven transmission.
     has_event_driven_axis: bool,
     /// Elements of the friction of the axes with the generalized Maxwell-slip model.
-    elements: Elements<L>,
+    elements: Elements,
     /// True if the friction of any axis has presliding.
     has_presliding: bool,
     /// True if the friction law of any axis has a Stribeck or viscous term.
@@ -250,21 +250,23 @@ pub(super) struct AxisBlock<const L: usize> {
     /// True if the current setpoint of any axis is filtered.
     has_filters: bool,
     /// Friction compensation of each velocity cycle, N·m at the motor; empty without compensation.
-    compensation: Vec<Aligned<[f64; L]>>,
+    compensation: Vec<Aligned<[f64; LANES]>>,
     /// Motor states at the start of each tick.
-    pub motors: Vec<Aligned<MotorState<[f64; L]>>>,
+    pub motors: Vec<Aligned<MotorState<[f64; LANES]>>>,
     /// States of the loads at the start of each tick; empty without an elastic axis.
-    pub loads: Vec<Aligned<LoadState<[f64; L]>>>,
+    pub loads: Vec<Aligned<LoadState<[f64; LANES]>>>,
     /// Record of the first tick, or of each tick if all are recorded.
-    pub records: Vec<Aligned<TickRecord<[f64; L]>>>,
+    pub records: Vec<Aligned<TickRecord<[f64; LANES]>>>,
     /// State at the start of a tick that can be repeated; empty at other times.
-    start: Vec<TickStart<L>>,
+    start: Vec<TickStart>,
 }
 
-impl<const L: usize> AxisBlock<L> {
-    /// Creates a block with `loops` in every lane.
-    pub fn new(loops: &InnerLoops, ticks: CycleTicks) -> Self {
-        AxisBlock {
+impl AxisBlock {
+    /// Creates a block of the axes `axes`, at least one and at most [`LANES`].
+    pub fn new(axes: &[InnerLoops], ticks: CycleTicks) -> Self {
+        let loops = &axes[0];
+        let mut block = AxisBlock {
+            axes: axes.len(),
             loops: Aligned(loops.fill()),
             state: Aligned(InnerLoopState::default().fill()),
             inputs: Aligned(InnerLoopInputs::default().fill()),
@@ -274,7 +276,7 @@ impl<const L: usize> AxisBlock<L> {
             span_state: Aligned(SpanState::default().fill()),
             has_tilting_axis: loops.plant.gravity.is_position_dependent(),
             has_elastic_axis: false,
-            event_driven: [const { None }; L],
+            event_driven: [const { None }; LANES],
             has_event_driven_axis: false,
             elements: Elements::none(),
             has_presliding: false,
@@ -285,7 +287,9 @@ impl<const L: usize> AxisBlock<L> {
             loads: Vec::new(),
             records: vec![Aligned(TickRecord::default().fill())],
             start: Vec::new(),
-        }
+        };
+        axes.iter().enumerate().for_each(|(lane, loops)| block.set_loops(lane, loops));
+        block
     }
 
     /// Returns the state in a lane.
@@ -328,7 +332,7 @@ impl<const L: usize> AxisBlock<L> {
         let rows = codec.integer(self.compensation.len() as u64, ticks.velocity_cycles() as u64) as usize;
         let records = codec.integer(self.records.len() as u64, ticks.position as u64) as usize;
         // Another axis of the block can have more rows.
-        self.compensation.resize_with(rows.max(self.compensation.len()), || Aligned([0.0; L]));
+        self.compensation.resize_with(rows.max(self.compensation.len()), || Aligned([0.0; LANES]));
         let record = || Aligned(TickRecord::default().fill());
         self.records.resize_with(records.max(self.records.len()), record);
         codec.numbers(self.compensation[..rows].iter_mut().map(|row| &mut row.0[lane]));
@@ -385,7 +389,7 @@ impl<const L: usize> AxisBlock<L> {
     pub fn set_loops(&mut self, lane: usize, loops: &InnerLoops) {
         self.loops.0.set_lane(lane, loops);
         self.expand(lane);
-        let any = |is: fn(&InnerLoops) -> bool| (0..L).any(|lane| is(&self.loops.0.lane(lane)));
+        let any = |is: fn(&InnerLoops) -> bool| (0..LANES).any(|lane| is(&self.loops.0.lane(lane)));
         self.has_tilting_axis = any(|loops| loops.plant.gravity.is_position_dependent());
         self.has_elastic_axis = any(|loops| loops.plant.transmission.is_elastic());
         self.has_filters = any(|loops| loops.filters.is_enabled());
@@ -429,7 +433,7 @@ impl<const L: usize> AxisBlock<L> {
 
     /// Sets the friction compensation of a lane; `torque` returns N·m at the motor for each velocity cycle.
     pub fn set_compensation(&mut self, lane: usize, ticks: CycleTicks, torque: impl Fn(usize) -> f64) {
-        self.compensation.resize_with(ticks.velocity_cycles(), || Aligned([0.0; L]));
+        self.compensation.resize_with(ticks.velocity_cycles(), || Aligned([0.0; LANES]));
         for (velocity_cycle, row) in self.compensation.iter_mut().enumerate() {
             row.0[lane] = torque(velocity_cycle);
         }
@@ -460,7 +464,8 @@ impl<const L: usize> AxisBlock<L> {
     /// ```
     #[inline(always)]
     pub fn run<S: Simd>(&mut self, simd: S, ticks: CycleTicks, span: TickSpan) {
-        if L.is_multiple_of(Unroll2::<Vector<S>>::LANES) {
+        // The latencies of one vector overlap with the operations of the other.
+        if 2 * S::F64_LANES <= LANES && S::F64_LANES < self.axes {
             self.run_chunks::<S, Unroll2<Vector<S>>>(simd, ticks, span);
         } else {
             self.run_chunks::<S, Vector<S>>(simd, ticks, span);
@@ -469,9 +474,8 @@ impl<const L: usize> AxisBlock<L> {
 
     #[inline(always)]
     fn run_chunks<S: Simd, N: SimdLoad<S>>(&mut self, simd: S, ticks: CycleTicks, span: TickSpan) {
-        assert!(L.is_multiple_of(N::LANES), "a vector is no wider than a block");
         let is_whole = span.first == 0 && span.end == ticks.position;
-        for index in 0..L / N::LANES {
+        for index in 0..self.axes.div_ceil(N::LANES) {
             // With more of the three true, only the time differs.
             match (is_whole, self.has_tilting_axis) {
                 _ if self.is_extended() => self.run_chunk::<S, N, true, true, true>(simd, index, ticks, span),
@@ -621,7 +625,7 @@ impl<const L: usize> AxisBlock<L> {
     }
 }
 
-impl<const L: usize> AxisBlock<L> {
+impl AxisBlock {
     /// Replaces the step of the axes with an event-driven transmission in `state` and in the speed drops by friction; each is
     /// stepped by itself.
     #[inline(always)]
@@ -635,7 +639,7 @@ impl<const L: usize> AxisBlock<L> {
         speed_drop: N,
     ) -> N {
         let InnerLoopState { motor, load, contact, .. } = *state;
-        let mut rows: Aligned<EventDrivenStep<[f64; L]>> = Aligned(EventDrivenStep::default().fill());
+        let mut rows: Aligned<EventDrivenStep<[f64; LANES]>> = Aligned(EventDrivenStep::default().fill());
         let vector = EventDrivenStep { motor, load, contact, speed_drop, voltage, external };
         rows.0.store(index, &vector);
         for lane in index * N::LANES..(index + 1) * N::LANES {

@@ -17,15 +17,13 @@ pub struct Circle {
 }
 
 /// An arc, parametrized by arc length.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct CircularArc {
     pub circle: Circle,
     /// Vector from the center to the start, m.
     pub start_radius: [f64; 2],
     /// Angle per unit of arc length, rad/m.
     pub angle_per_length: f64,
-    /// Change of the other coordinates per unit of arc length; 0 in the plane.
-    pub slopes: Vec<f64>,
 }
 
 impl CircularArc {
@@ -34,20 +32,16 @@ impl CircularArc {
         rotated(self.start_radius, self.angle_per_length * s)
     }
 
-    pub fn point(&self, from: &[f64], s: f64, out: &mut [f64]) {
-        for ((value, from), slope) in out.iter_mut().zip(from).zip(&self.slopes) {
-            *value = from + slope * s;
-        }
+    /// Writes the coordinates in the plane.
+    pub fn point(&self, s: f64, out: &mut [f64]) {
         let radius_vector = self.radius_at(s);
         for i in 0..2 {
             out[self.circle.plane[i]] = self.circle.center[i] + radius_vector[i];
         }
     }
 
+    /// Writes the derivatives of the coordinates in the plane.
     pub fn derivatives(&self, s: f64, out: &mut Derivatives) {
-        out.first.copy_from_slice(&self.slopes);
-        out.second.fill(0.0);
-        out.third.fill(0.0);
         let [x, y] = self.radius_at(s);
         let k = self.angle_per_length;
         let [p, q] = self.circle.plane;

@@ -3,7 +3,6 @@
 use super::arc::{Circle, CircularArc, rotated};
 use super::derivatives::Derivatives;
 use super::error::PathError;
-use super::line::Line;
 use super::spline::Spline;
 use crate::config::AxisKind;
 use crate::units::REVOLUTION;
@@ -18,13 +17,15 @@ pub struct Block {
     shape: Shape,
     start: Vec<f64>,
     end: Vec<f64>,
+    /// Change of each coordinate per unit of length, of those outside the plane of an arc; empty for a spline.
+    slopes: Vec<f64>,
     length: f64,
     kind: AxisKind,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 enum Shape {
-    Line(Line),
+    Line,
     Arc(CircularArc),
     Spline(Spline),
 }
@@ -41,8 +42,7 @@ impl Block {
         let steps: Vec<f64> = from.iter().zip(to).map(|(from, to)| to - from).collect();
         let (length, kind) = measure(&steps, kinds).ok_or(PathError::ZeroLength)?;
         let slopes = slopes(&steps, length)?;
-        let shape = Shape::Line(Line { slopes });
-        Ok(Self { shape, start: from.to_vec(), end: to.to_vec(), length, kind })
+        Ok(Self { shape: Shape::Line, start: from.to_vec(), end: to.to_vec(), slopes, length, kind })
     }
 
     /// Creates a circular arc or helix in the plane of the two linear coordinates `plane`, with its center
@@ -103,8 +103,8 @@ impl Block {
             return Err(PathError::NotComputable { length });
         }
         let circle = Circle { plane, center, radius, sweep };
-        let shape = Shape::Arc(CircularArc { circle, start_radius: radius_vector, angle_per_length, slopes });
-        Ok(Self { shape, start: from.to_vec(), end, length, kind })
+        let shape = Shape::Arc(CircularArc { circle, start_radius: radius_vector, angle_per_length });
+        Ok(Self { shape, start: from.to_vec(), end, slopes, length, kind })
     }
 
     /// Creates a clamped uniform cubic B-spline (C²); `points` are its control points after `from`, at
@@ -123,7 +123,8 @@ impl Block {
         }
         let (spline, kind) = Spline::new(from, points, kinds)?;
         let end = points.last().cloned().unwrap_or_default();
-        Ok(Self { length: spline.length(), shape: Shape::Spline(spline), start: from.to_vec(), end, kind })
+        let (length, start) = (spline.length(), from.to_vec());
+        Ok(Self { shape: Shape::Spline(spline), start, end, slopes: Vec::new(), length, kind })
     }
 
     /// Returns the arc length, m or rad depending on [`kind`](Self::kind).
@@ -155,15 +156,19 @@ impl Block {
     pub fn point(&self, s: f64, out: &mut [f64]) {
         debug_assert_eq!(out.len(), self.joints(), "one value per coordinate");
         if s <= 0.0 {
-            return copy(&self.start, out);
+            return out.copy_from_slice(&self.start);
         }
         if s >= self.length {
-            return copy(&self.end, out);
+            return out.copy_from_slice(&self.end);
         }
-        match &self.shape {
-            Shape::Line(line) => line.point(&self.start, s, out),
-            Shape::Arc(arc) => arc.point(&self.start, s, out),
-            Shape::Spline(spline) => spline.point(s, out),
+        if let Shape::Spline(spline) = &self.shape {
+            return spline.point(s, out);
+        }
+        for ((value, start), slope) in out.iter_mut().zip(&self.start).zip(&self.slopes) {
+            *value = start + slope * s;
+        }
+        if let Shape::Arc(arc) = &self.shape {
+            arc.point(s, out);
         }
     }
 
@@ -180,10 +185,14 @@ impl Block {
             order.resize(self.joints(), 0.0);
         }
         let s = s.clamp(0.0, self.length);
-        match &self.shape {
-            Shape::Line(line) => line.derivatives(out),
-            Shape::Arc(arc) => arc.derivatives(s, out),
-            Shape::Spline(spline) => spline.derivatives(s, out),
+        if let Shape::Spline(spline) = &self.shape {
+            return spline.derivatives(s, out);
+        }
+        out.first.copy_from_slice(&self.slopes);
+        out.second.fill(0.0);
+        out.third.fill(0.0);
+        if let Shape::Arc(arc) = &self.shape {
+            arc.derivatives(s, out);
         }
     }
 
@@ -197,7 +206,7 @@ impl Block {
 
     /// Returns true for a straight line in programmed coordinates.
     pub fn is_line(&self) -> bool {
-        matches!(self.shape, Shape::Line(_))
+        matches!(self.shape, Shape::Line)
     }
 
     /// Returns the arc lengths, from 0 to the length, between which all derivatives are continuous.
@@ -211,16 +220,10 @@ impl Block {
     /// Returns true if the coordinates at `indices` are constant along the block.
     pub fn is_constant(&self, indices: impl IntoIterator<Item = usize>) -> bool {
         indices.into_iter().filter(|index| *index < self.joints()).all(|index| match &self.shape {
-            Shape::Line(line) => line.slopes[index] == 0.0,
-            Shape::Arc(arc) => !arc.circle.plane.contains(&index) && arc.slopes[index] == 0.0,
+            Shape::Line => self.slopes[index] == 0.0,
+            Shape::Arc(arc) => !arc.circle.plane.contains(&index) && self.slopes[index] == 0.0,
             Shape::Spline(spline) => spline.is_constant(index),
         })
-    }
-}
-
-fn copy(from: &[f64], to: &mut [f64]) {
-    for (to, from) in to.iter_mut().zip(from) {
-        *to = *from;
     }
 }
 

@@ -12,26 +12,10 @@ const SPEED_FRACTIONS: [f64; 7] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.35];
 /// Candidate accelerations, as fractions of the largest one at that speed.
 const ACCELERATION_FRACTIONS: [f64; 4] = [1.0, 0.75, 0.5, 0.3];
 
-/// Magnitudes of the three derivatives of each joint, sample by sample.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Samples {
-    rows: Vec<[f64; 3]>,
-}
-
-impl Samples {
-    pub fn push(&mut self, derivatives: &Derivatives) {
-        let orders = derivatives.first.iter().zip(&derivatives.second).zip(&derivatives.third);
-        self.rows.extend(orders.map(|((first, second), third)| [first.abs(), second.abs(), third.abs()]));
-    }
-
-    /// Returns the samples `from..to`.
-    pub fn range(&self, from: usize, to: usize, joints: usize) -> &[[f64; 3]] {
-        &self.rows[from * joints..to * joints]
-    }
-
-    pub fn all(&self) -> &[[f64; 3]] {
-        &self.rows
-    }
+/// Appends the magnitudes of the three derivatives of each joint at one sample.
+pub(super) fn push_sample(derivatives: &Derivatives, rows: &mut Vec<[f64; 3]>) {
+    let orders = derivatives.first.iter().zip(&derivatives.second).zip(&derivatives.third);
+    rows.extend(orders.map(|((first, second), third)| [first.abs(), second.abs(), third.abs()]));
 }
 
 /// Returns the minimum over joints and samples of `bound`, a function of a joint's limits and derivatives.

@@ -32,7 +32,7 @@ impl<'a> JointCurve<'a> {
     pub fn new(path: &'a Path, block: usize) -> Self {
         let method = match path.frame() {
             Frame::Joints => DerivativeMethod::Direct,
-            Frame::Workpiece if path.has_fixed_tables(block) => DerivativeMethod::Rotated,
+            Frame::Workpiece if path.has_fixed_rotary_axes(block) => DerivativeMethod::Rotated,
             Frame::Workpiece => DerivativeMethod::Differences,
         };
         let joints = path.joint_count();

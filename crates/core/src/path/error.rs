@@ -1,20 +1,19 @@
 //! Errors of paths and feed planning.
 
-use std::fmt;
-
 use thiserror::Error;
 
 use crate::units::{Rounded, speed_text, velocity_limit_key};
 
-/// A derivative of the setpoint with a limit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SetpointDerivative {
-    /// Speed, m/s or rad/s.
-    Speed,
-    /// Acceleration, m/s² or rad/s².
-    Acceleration,
-    /// Jerk, m/s³ or rad/s³.
-    Jerk,
+crate::named_values! {
+    /// A derivative of the setpoint with a limit.
+    pub enum SetpointDerivative {
+        /// Speed, m/s or rad/s.
+        Speed = "speed",
+        /// Acceleration, m/s² or rad/s².
+        Acceleration = "acceleration",
+        /// Jerk, m/s³ or rad/s³.
+        Jerk = "jerk",
+    }
 }
 
 impl SetpointDerivative {
@@ -25,16 +24,6 @@ impl SetpointDerivative {
             Self::Acceleration => "s²",
             Self::Jerk => "s³",
         }
-    }
-}
-
-impl fmt::Display for SetpointDerivative {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Speed => "speed",
-            Self::Acceleration => "acceleration",
-            Self::Jerk => "jerk",
-        })
     }
 }
 
@@ -146,35 +135,11 @@ pub enum PlanError {
         /// Number of coordinates.
         wanted: usize,
     },
-    /// Joint limit that is not finite and positive.
-    #[error("joint {joint}: the largest {quantity} must be finite and larger than 0; found {value}")]
-    InvalidLimit {
-        /// Name of the joint.
-        joint: String,
-        /// Limited quantity.
-        quantity: SetpointDerivative,
-        /// Value found.
-        value: f64,
-    },
-    /// Position cycle that is not positive.
-    #[error("the position cycle must be larger than 0; found {found} ns")]
-    InvalidPeriod {
-        /// Value found, ns.
-        found: i64,
-    },
-    /// Rest before the first move that is negative or not finite.
-    #[error("the rest before the first move must be finite and not negative; found {found} s")]
-    InvalidRest {
-        /// Value found, s.
-        found: f64,
-    },
-    /// Move parameter out of range.
-    #[error("move {index}: {what} must be {allowed}; found {}", Rounded(*found))]
+    /// Value out of range.
+    #[error("{what} must be {allowed}; found {}", Rounded(*found))]
     InvalidValue {
-        /// Move, counted from 1.
-        index: usize,
-        /// Name and unit of the parameter.
-        what: &'static str,
+        /// Move or joint, name and unit of the value.
+        what: String,
         /// Allowed range.
         allowed: &'static str,
         /// Value found.

@@ -1,16 +1,20 @@
 //! Continuous paths: blocks joined without gaps, and the tool pose along them.
 
+use serde::Deserialize;
+
 use super::block::Block;
 use super::error::PathError;
-use crate::kinematics::{AxisRole, Kinematics, ToolPose};
+use crate::kinematics::{Kinematics, ToolPose};
 
 /// Largest gap between two blocks, relative to the coordinate (or to 1 m, 1 rad).
 const GAP_TOLERANCE: f64 = 1e-12;
 
 /// Coordinate system of a path.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Frame {
     /// Joint positions.
+    #[default]
     Joints,
     /// Tool tip in the workpiece frame for x, y and z, joint positions for the others
     /// ([`Kinematics::tip_to_joints`]).
@@ -122,20 +126,13 @@ impl Path {
     /// Returns the tool pose in the workpiece frame at progress `u`, clamped to the path.
     pub fn tool(&self, u: f64) -> ToolPose {
         let mut joints = vec![0.0; self.joint_count()];
-        self.tool_with(u, &mut joints)
-    }
-
-    /// Returns the tool pose as [`tool`](Self::tool) does, and the joint positions in `joints`, which holds
-    /// one value per joint.
-    pub fn tool_with(&self, u: f64, joints: &mut [f64]) -> ToolPose {
-        self.joints(u, joints);
-        self.kinematics.forward(joints)
+        self.joints(u, &mut joints);
+        self.kinematics.forward(&joints)
     }
 
     /// Returns true if the rotary tables are fixed along `block`, so that joints and tip differ by a rigid
     /// transformation.
-    pub fn has_fixed_tables(&self, block: usize) -> bool {
-        let tables = [AxisRole::A, AxisRole::C].into_iter().filter_map(|role| self.kinematics.role(role));
-        self.blocks.get(block).is_none_or(|block| block.is_constant(tables))
+    pub fn has_fixed_rotary_axes(&self, block: usize) -> bool {
+        self.blocks.get(block).is_none_or(|block| block.is_constant(self.kinematics.rotary_joints()))
     }
 }

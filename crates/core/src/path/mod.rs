@@ -29,14 +29,12 @@
 mod arc;
 mod block;
 mod bounds;
-mod cosine;
 mod curve;
 mod derivatives;
 mod error;
 mod geometry;
 mod junction;
 mod limit_use;
-mod line;
 mod planner;
 mod profile;
 mod program;

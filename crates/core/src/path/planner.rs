@@ -3,14 +3,14 @@
 
 use std::sync::Arc;
 
-use super::cosine::{CosineProfile, both_ramps_length};
 use super::curve::JointCurve;
 use super::derivatives::Derivatives;
-use super::error::{PlanError, SetpointDerivative};
+use super::error::PlanError;
 use super::geometry::{Frame, Path};
 use super::junction::{Junction, share_jerk};
-use super::profile::{FeedLimits, SpeedProfilePlanner, max_reachable_speed};
-use super::program::{FeedProfile, Move, Program, SpanProfile, TimedSpan};
+use super::limit_use::LimitUse;
+use super::profile::{FeedLimits, SpeedProfile, both_ramps_length, max_reachable_speed};
+use super::program::{FeedProfile, Move, PathLimits, Program, TimedSpan};
 use super::spans::{SpanDivider, SpanDraft, end_pieces, sample_block};
 use super::verify::{LimitViolations, SpanProperties, verify};
 use crate::config::LimitsConfig;
@@ -29,15 +29,6 @@ const JUMP_THRESHOLD: f64 = 0.1;
 /// Additional relative reduction, which avoids another round.
 const EXTRA_REDUCTION: f64 = 1e-3;
 
-/// Parameters of a move without its block.
-struct MoveParameters {
-    feed: f64,
-    corner: Option<f64>,
-    cap: FeedLimits,
-    profile: FeedProfile,
-    dwell: f64,
-}
-
 impl Program {
     /// Plans the feed profiles of `moves` for joints with `limits`.
     ///
@@ -54,28 +45,18 @@ impl Program {
         rest: f64,
         moves: Vec<Move>,
     ) -> Result<Self, PlanError> {
-        if period <= 0 {
-            return Err(PlanError::InvalidPeriod { found: period });
-        }
-        if !rest.is_finite() || rest < 0.0 {
-            return Err(PlanError::InvalidRest { found: rest });
-        }
-        let joints = check_limits(limits)?;
-        let mut parameters = Vec::with_capacity(moves.len());
-        let mut blocks = Vec::with_capacity(moves.len());
-        for (i, planned) in moves.into_iter().enumerate() {
-            check_move(i + 1, &planned)?;
-            let Move { block, feed, corner, limits, profile, dwell } = planned;
-            let cap = FeedLimits { velocity: feed, acceleration: limits.acceleration, jerk: limits.jerk };
-            parameters.push(MoveParameters { feed, corner, cap, profile, dwell });
-            blocks.push(block);
-        }
+        check(|| "the position cycle, ns,".to_owned(), "larger than 0", period as f64, period > 0)?;
+        check_time(|| "the rest before the first move, s,".to_owned(), rest)?;
+        check_limits(limits)?;
+        let joints: Vec<LimitsConfig> = limits.iter().map(|joint| joint.limits).collect();
+        (1..).zip(&moves).try_for_each(|(index, planned)| check_move(index, planned))?;
+        let blocks = moves.iter().map(|planned| planned.block.clone()).collect();
         let path = Path::new(kinematics, frame, blocks)?;
         if path.joint_count() != joints.len() {
             return Err(PlanError::JointCount { found: joints.len(), wanted: path.joint_count() });
         }
-        check_cosines(&path, &parameters, limits)?;
-        let mut draft = ProgramDraft::new(Arc::new(path), parameters, joints, seconds(period), rest)?;
+        check_cosines(&path, &moves, limits)?;
+        let mut draft = ProgramDraft::new(Arc::new(path), moves, joints, seconds(period), rest)?;
         let mut round = 0;
         loop {
             let program = draft.program()?;
@@ -84,15 +65,15 @@ impl Program {
             let Some(worst) = &violations.worst else { return Ok(program) };
             round += 1;
             if round == MAX_ROUNDS {
-                let joint = &limits[worst.joint];
+                let (joint, LimitUse { quantity, allowed, .. }) = (&limits[worst.joint], worst.found);
                 return Err(PlanError::LimitExceeded {
                     index: program.spans[worst.span].block + 1,
                     time: worst.time,
                     joint: joint.name.clone(),
                     unit: joint.unit(),
-                    quantity: worst.quantity,
-                    found: worst.ratio * worst.allowed,
-                    allowed: worst.allowed,
+                    quantity,
+                    found: worst.found.ratio() * allowed,
+                    allowed,
                 });
             }
             draft.reduce(&violations);
@@ -100,54 +81,58 @@ impl Program {
     }
 }
 
-fn check_limits(limits: &[JointLimits]) -> Result<Vec<LimitsConfig>, PlanError> {
+fn check(
+    what: impl FnOnce() -> String,
+    allowed: &'static str,
+    found: f64,
+    holds: bool,
+) -> Result<(), PlanError> {
+    if holds { Ok(()) } else { Err(PlanError::InvalidValue { what: what(), allowed, found }) }
+}
+
+fn check_positive(what: impl FnOnce() -> String, found: f64) -> Result<(), PlanError> {
+    check(what, "finite and larger than 0", found, found.is_finite() && found > 0.0)
+}
+
+fn check_time(what: impl FnOnce() -> String, found: f64) -> Result<(), PlanError> {
+    check(what, "finite and not negative", found, found.is_finite() && found >= 0.0)
+}
+
+fn check_limits(limits: &[JointLimits]) -> Result<(), PlanError> {
     for joint in limits {
         let LimitsConfig { velocity, acceleration, jerk, .. } = joint.limits;
-        let values = [
-            (SetpointDerivative::Speed, velocity),
-            (SetpointDerivative::Acceleration, acceleration),
-            (SetpointDerivative::Jerk, jerk),
-        ];
-        for (quantity, value) in values {
-            if !value.is_finite() || value <= 0.0 {
-                return Err(PlanError::InvalidLimit { joint: joint.name.clone(), quantity, value });
-            }
+        for (quantity, value) in [("speed", velocity), ("acceleration", acceleration), ("jerk", jerk)] {
+            check_positive(|| format!("joint {}: the largest {quantity}", joint.name), value)?;
         }
     }
-    Ok(limits.iter().map(|joint| joint.limits).collect())
+    Ok(())
 }
 
 fn check_move(index: usize, parameters: &Move) -> Result<(), PlanError> {
-    let check = |what, found: f64, allowed, holds: bool| {
-        if holds { Ok(()) } else { Err(PlanError::InvalidValue { index, what, allowed, found }) }
-    };
     let Move { feed, dwell, limits, .. } = *parameters;
-    check("feed, m/s or rad/s,", feed, "finite and larger than 0", feed.is_finite() && feed > 0.0)?;
-    check("dwell, s,", dwell, "finite and not negative", dwell.is_finite() && dwell >= 0.0)?;
-    check("acceleration, m/s² or rad/s²,", limits.acceleration, "larger than 0", limits.acceleration > 0.0)?;
-    check("jerk, m/s³ or rad/s³,", limits.jerk, "larger than 0", limits.jerk > 0.0)?;
+    let of_move = |what: &'static str| move || format!("move {index}: {what}");
+    check_positive(of_move("feed, m/s or rad/s,"), feed)?;
+    check_time(of_move("dwell, s,"), dwell)?;
+    let PathLimits { acceleration, jerk } = limits;
+    check(of_move("acceleration, m/s² or rad/s²,"), "larger than 0", acceleration, acceleration > 0.0)?;
+    check(of_move("jerk, m/s³ or rad/s³,"), "larger than 0", jerk, jerk > 0.0)?;
     if let Some(corner) = parameters.corner {
-        check(
-            "corner speed, m/s or rad/s,",
-            corner,
-            "finite and not negative",
-            corner.is_finite() && corner >= 0.0,
-        )?;
+        check_time(of_move("corner speed, m/s or rad/s,"), corner)?;
     }
     let FeedProfile::Cosine { ramp } = parameters.profile else { return Ok(()) };
-    check("ramp, s,", ramp, "finite and larger than 0", ramp.is_finite() && ramp > 0.0)?;
+    check_positive(of_move("ramp, s,"), ramp)?;
     let (length, needed) = (parameters.block.length(), both_ramps_length(feed, ramp));
     if needed > length { Err(PlanError::TooShort { index, length, needed }) } else { Ok(()) }
 }
 
 /// Checks that cosine profiles, which are not adapted, keep the joints within Vmax.
-fn check_cosines(path: &Path, moves: &[MoveParameters], limits: &[JointLimits]) -> Result<(), PlanError> {
+fn check_cosines(path: &Path, moves: &[Move], limits: &[JointLimits]) -> Result<(), PlanError> {
     for (block, parameters) in moves.iter().enumerate() {
-        if !matches!(parameters.profile, FeedProfile::Cosine { .. }) {
+        if !parameters.is_cosine() {
             continue;
         }
         let samples = sample_block(&mut JointCurve::new(path, block));
-        let rows = samples.all().chunks_exact(limits.len());
+        let rows = samples.chunks_exact(limits.len());
         let speeds = rows.flat_map(|row| row.iter().zip(limits)).map(|(slopes, joint)| {
             let (found, allowed) = (slopes[0] * parameters.feed, joint.limits.velocity);
             (found / allowed, found, joint)
@@ -167,7 +152,7 @@ fn check_cosines(path: &Path, moves: &[MoveParameters], limits: &[JointLimits]) 
 /// A program during planning.
 struct ProgramDraft {
     path: Arc<Path>,
-    moves: Vec<MoveParameters>,
+    moves: Vec<Move>,
     joints: Vec<LimitsConfig>,
     rest: f64,
     drafts: Vec<SpanDraft>,
@@ -175,13 +160,12 @@ struct ProgramDraft {
     junctions: Vec<Junction>,
     /// Speed at the end of each draft in the latest program.
     exits: Vec<f64>,
-    planner: SpeedProfilePlanner,
 }
 
 impl ProgramDraft {
     fn new(
         path: Arc<Path>,
-        moves: Vec<MoveParameters>,
+        moves: Vec<Move>,
         joints: Vec<LimitsConfig>,
         period: f64,
         rest: f64,
@@ -200,11 +184,11 @@ impl ProgramDraft {
                     block,
                     s_from: 0.0,
                     s_to: length,
-                    limits: parameters.cap,
+                    limits: parameters.cap(),
                     is_straight: true,
                 }]
             } else {
-                SpanDivider { joints: &joints, cap: parameters.cap, length }.divide(&mut curve, block)
+                SpanDivider { joints: &joints, cap: parameters.cap(), length }.divide(&mut curve, block)
             };
             if let Some(previous) = block.checked_sub(1).map(|previous| &moves[previous]) {
                 curve.derivatives(0.0, pieces[0], &mut after);
@@ -235,8 +219,7 @@ impl ProgramDraft {
             junctions.extend(spans.iter().skip(1).map(|_| Junction::INSIDE));
             drafts.extend(spans);
         }
-        let (exits, planner) = (Vec::new(), SpeedProfilePlanner::default());
-        Ok(Self { path, moves, joints, rest, drafts, junctions, exits, planner })
+        Ok(Self { path, moves, joints, rest, drafts, junctions, exits: Vec::new() })
     }
 
     /// Returns entry and exit speed of each draft: a forward pass limits by reachable speed, a backward
@@ -268,21 +251,13 @@ impl ProgramDraft {
         let speeds = self.speeds();
         self.exits = speeds.iter().map(|(_, exit)| *exit).collect();
         let mut spans: Vec<TimedSpan> = Vec::with_capacity(self.drafts.len());
-        let mut first_span = Vec::with_capacity(self.moves.len() + 1);
         let mut t = self.rest;
         for (i, (draft, (entry, exit))) in self.drafts.iter().zip(speeds).enumerate() {
             let SpanDraft { block, s_from, s_to, limits, .. } = *draft;
             let parameters = &self.moves[block];
-            if first_span.len() == block {
-                first_span.push(i);
-            }
             let profile = match parameters.profile {
-                FeedProfile::Cosine { ramp } => {
-                    SpanProfile::Cosine(CosineProfile::new(draft.length(), parameters.feed, ramp))
-                }
-                FeedProfile::JerkLimited => {
-                    SpanProfile::Jerk(self.planner.plan(draft.length(), entry, exit, &limits))
-                }
+                FeedProfile::Cosine { ramp } => SpeedProfile::cosine(draft.length(), parameters.feed, ramp),
+                FeedProfile::JerkLimited => SpeedProfile::new(draft.length(), entry, exit, &limits),
             };
             let duration = profile.duration();
             let end = t + duration;
@@ -296,13 +271,12 @@ impl ProgramDraft {
         if !t.is_finite() {
             return Err(PlanError::NotComputable { index: self.moves.len(), found: t });
         }
-        first_span.push(spans.len());
         let mut programmed_feeds = [0.0; 2];
         for (block, parameters) in self.path.blocks().iter().zip(&self.moves) {
             let highest: &mut f64 = &mut programmed_feeds[block.kind() as usize];
             *highest = highest.max(parameters.feed);
         }
-        Ok(Program { path: Arc::clone(&self.path), spans, first_span, duration: t, programmed_feeds })
+        Ok(Program { path: Arc::clone(&self.path), spans, duration: t, programmed_feeds })
     }
 
     /// Returns the properties of each span that the verification needs.
@@ -340,8 +314,13 @@ impl ProgramDraft {
     }
 }
 
-impl MoveParameters {
+impl Move {
     fn is_cosine(&self) -> bool {
         matches!(self.profile, FeedProfile::Cosine { .. })
+    }
+
+    /// Returns the feed and the limits of the move.
+    fn cap(&self) -> FeedLimits {
+        FeedLimits { velocity: self.feed, acceleration: self.limits.acceleration, jerk: self.limits.jerk }
     }
 }

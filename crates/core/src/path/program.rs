@@ -4,7 +4,6 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::block::Block;
-use super::cosine::CosineProfile;
 use super::geometry::Path;
 use super::profile::SpeedProfile;
 use crate::config::AxisKind;
@@ -66,37 +65,6 @@ impl Move {
     }
 }
 
-/// Planned feed profile of a span.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum SpanProfile {
-    Jerk(SpeedProfile),
-    Cosine(CosineProfile),
-}
-
-impl SpanProfile {
-    pub fn duration(&self) -> f64 {
-        match self {
-            Self::Jerk(profile) => profile.duration(),
-            Self::Cosine(cosine) => cosine.duration(),
-        }
-    }
-
-    fn at(&self, t: f64) -> f64 {
-        match self {
-            Self::Jerk(profile) => profile.at(t),
-            Self::Cosine(cosine) => cosine.at(t),
-        }
-    }
-
-    /// Returns the highest speed, and a time at which it is reached, s.
-    fn highest_speed(&self) -> (f64, f64) {
-        match self {
-            Self::Jerk(profile) => (profile.highest_speed(), profile.time_of_highest_speed()),
-            Self::Cosine(cosine) => (cosine.highest_speed(), cosine.time_of_highest_speed()),
-        }
-    }
-}
-
 /// Part of a block with one feed profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct TimedSpan {
@@ -106,7 +74,7 @@ pub(super) struct TimedSpan {
     /// Start time, s.
     pub start: f64,
     pub end: f64,
-    pub profile: SpanProfile,
+    pub profile: SpeedProfile,
 }
 
 /// A path with its feed profiles: position along the path over time.
@@ -127,8 +95,6 @@ pub(super) struct TimedSpan {
 pub struct Program {
     pub(super) path: Arc<Path>,
     pub(super) spans: Vec<TimedSpan>,
-    /// Index of the first span of each block, followed by the number of spans.
-    pub(super) first_span: Vec<usize>,
     pub(super) duration: f64,
     /// Highest programmed feed of the linear moves, m/s, and of the rotary moves, rad/s; 0 without such moves.
     pub(super) programmed_feeds: [f64; 2],
@@ -153,10 +119,8 @@ impl Program {
     /// Returns the highest feed that moves of one kind reach, m/s or rad/s, and a time at which it is reached, s.
     pub fn highest_feed(&self, kind: AxisKind) -> (f64, f64) {
         let spans = self.spans.iter().filter(|span| self.path.blocks()[span.block].kind() == kind);
-        let feeds = spans.map(|span| {
-            let (feed, time) = span.profile.highest_speed();
-            (feed, span.start + time)
-        });
+        let feeds = spans
+            .map(|span| (span.profile.highest_speed(), span.start + span.profile.time_of_highest_speed()));
         feeds.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
     }
 
@@ -185,12 +149,12 @@ impl Program {
 
     /// Returns the highest feed that is reached in `block`, counted from 0, m/s or rad/s; 0 beyond the last block.
     pub fn highest_feed_of(&self, block: usize) -> f64 {
-        self.spans_of(block).iter().map(|span| span.profile.highest_speed().0).fold(0.0, f64::max)
+        self.spans_of(block).iter().map(|span| span.profile.highest_speed()).fold(0.0, f64::max)
     }
 
     fn spans_of(&self, block: usize) -> &[TimedSpan] {
-        let index = |i: usize| self.first_span.get(i).copied().unwrap_or(self.spans.len());
-        &self.spans[index(block)..index(block.saturating_add(1))]
+        let from = self.spans.partition_point(|span| span.block < block);
+        &self.spans[from..self.spans.partition_point(|span| span.block <= block)]
     }
 
     /// Returns the index of the last span that starts at or before `t`, or 0.

@@ -1,6 +1,6 @@
 //! Division of blocks into spans with constant feed limits.
 
-use super::bounds::{Samples, fastest_limits};
+use super::bounds::{fastest_limits, push_sample};
 use super::curve::JointCurve;
 use super::derivatives::Derivatives;
 use super::profile::{FeedLimits, Ramp};
@@ -38,15 +38,10 @@ impl SpanDraft {
     }
 }
 
-/// Returns samples of a whole block.
-pub(super) fn sample_block(curve: &mut JointCurve<'_>) -> Samples {
-    let mut samples = Samples::default();
-    let cells = if let Some(samples_at) = single_cell(curve) { vec![samples_at] } else { cells(curve) };
-    let mut derivatives = Derivatives::new(curve.block().joints());
-    for cell in cells {
-        sample(curve, &cell, &mut derivatives, &mut samples);
-    }
-    samples
+/// Returns the magnitudes of the three derivatives of each joint along a whole block, sample by sample.
+pub(super) fn sample_block(curve: &mut JointCurve<'_>) -> Vec<[f64; 3]> {
+    let cells = single_cell(curve).map_or_else(|| cells(curve), |cell| vec![cell]);
+    sample(curve, &cells)
 }
 
 /// A cell: its smooth piece and the arc lengths of its samples, including both ends.
@@ -61,11 +56,15 @@ impl Cell {
     }
 }
 
-fn sample(curve: &mut JointCurve<'_>, cell: &Cell, derivatives: &mut Derivatives, samples: &mut Samples) {
-    for &s in &cell.samples_at {
-        curve.derivatives(s, cell.piece, derivatives);
-        samples.push(derivatives);
+fn sample(curve: &mut JointCurve<'_>, cells: &[Cell]) -> Vec<[f64; 3]> {
+    let (mut rows, mut derivatives) = (Vec::new(), Derivatives::new(curve.block().joints()));
+    for cell in cells {
+        for &s in &cell.samples_at {
+            curve.derivatives(s, cell.piece, &mut derivatives);
+            push_sample(&derivatives, &mut rows);
+        }
     }
+    rows
 }
 
 /// Returns the single cell of a straight line, or of an arc in joint space, which has constant curvature.
@@ -150,22 +149,17 @@ pub(super) struct SpanDivider<'a> {
 impl SpanDivider<'_> {
     /// Returns the spans of block `block` in order.
     pub fn divide(&self, curve: &mut JointCurve<'_>, block: usize) -> Vec<SpanDraft> {
-        let mut samples = Samples::default();
-        let mut derivatives = Derivatives::new(self.joints.len());
         let is_straight = curve.is_straight();
         if let Some(cell) = single_cell(curve) {
-            sample(curve, &cell, &mut derivatives, &mut samples);
-            let limits = fastest_limits(samples.all(), self.joints, &self.cap, self.length);
+            let limits = fastest_limits(&sample(curve, &[cell]), self.joints, &self.cap, self.length);
             return vec![SpanDraft { block, s_from: 0.0, s_to: self.length, limits, is_straight }];
         }
         let cells = cells(curve);
-        for cell in &cells {
-            sample(curve, cell, &mut derivatives, &mut samples);
-        }
-        let per_cell = SAMPLES_OF_CELL + 1;
+        let rows = sample(curve, &cells);
+        let per_cell = (SAMPLES_OF_CELL + 1) * self.joints.len();
         let make = |from: usize, to: usize| {
-            let rows = samples.range(from * per_cell, to * per_cell, self.joints.len());
-            let limits = fastest_limits(rows, self.joints, &self.cap, self.length);
+            let limits =
+                fastest_limits(&rows[from * per_cell..to * per_cell], self.joints, &self.cap, self.length);
             let (s_from, s_to) = (cells[from].ends().0, cells[to - 1].ends().1);
             SpanDraft { block, s_from, s_to, limits, is_straight }
         };

@@ -1,6 +1,5 @@
 //! Verification of sampled setpoints against the joint limits.
 
-use super::error::SetpointDerivative;
 use super::limit_use::LimitUse;
 use super::program::Program;
 use crate::config::LimitsConfig;
@@ -35,10 +34,7 @@ pub(super) struct Excess {
     /// Time of the violation, s.
     pub time: f64,
     pub joint: usize,
-    pub quantity: SetpointDerivative,
-    /// Value found divided by the limit.
-    pub ratio: f64,
-    pub allowed: f64,
+    pub found: LimitUse,
 }
 
 /// Reduction factors of spans and junctions, 1 for none, and the largest violation.
@@ -139,9 +135,7 @@ impl Verifier<'_> {
             for (order, found) in (1..).zip(LimitUse::of_setpoints(setpoints, t, period, limits)) {
                 if found.is_exceeded() {
                     let (from, to) = (self.window[WINDOW - 1 - order as usize].0, self.window[WINDOW - 1].0);
-                    let LimitUse { quantity, allowed, .. } = found;
-                    let excess = Excess { span: to, time: t, joint, quantity, ratio: found.ratio(), allowed };
-                    self.attribute(from, to, order, excess);
+                    self.attribute(from, to, order, Excess { span: to, time: t, joint, found });
                 }
             }
         }
@@ -153,10 +147,11 @@ impl Verifier<'_> {
         if spans.iter().any(|span| span.is_exempt) || junctions.iter().any(|junction| junction.is_corner) {
             return;
         }
-        if self.violations.worst.is_none_or(|worst| worst.ratio < excess.ratio) {
+        let ratio = excess.found.ratio();
+        if self.violations.worst.is_none_or(|worst| worst.found.ratio() < ratio) {
             self.violations.worst = Some(excess);
         }
-        let factor = excess.ratio.powf(-1.0 / f64::from(order));
+        let factor = ratio.powf(-1.0 / f64::from(order));
         let slow = |factors: &mut [f64], is_cause: &dyn Fn(&SpanProperties) -> bool| {
             for (slowed, _) in factors.iter_mut().zip(spans).filter(|(_, span)| is_cause(span)) {
                 *slowed = slowed.min(factor);

@@ -6,14 +6,13 @@ use serde_saphyr::Spanned;
 
 use crate::config::{AxisKind, MachineConfig};
 use crate::kinematics::{AxisRole, Kinematics};
-use crate::path::{Block, FeedProfile, Frame, Move, PathError, PathLimits, Program};
-use crate::text::shortened;
+use crate::path::{Block, FeedProfile, Move, PathLimits, Program};
 use crate::trajectory::JointLimits;
 use crate::units::{DEGREE, METER_PER_MINUTE, REVOLUTION, RPM, Rounded};
 
 use super::coordinates::{coordinate, overlay};
 use super::error::ScenarioError;
-use super::file::{ArcEntry, FrameName, MoveEntry, ScenarioFile, Values};
+use super::file::{ArcEntry, KeyedNumbers, MoveEntry, ScenarioFile};
 use crate::yaml::{self, YamlNumber};
 
 /// Maximum number of moves of a scenario.
@@ -38,7 +37,7 @@ pub(super) fn program(
         name,
         kinds: joints.iter().map(|joint| joint.kind).collect(),
         point: vec![0.0; joints.len()],
-        limits: ByKind::default(),
+        limits: [PathLimits::default(); 2],
         feeds: default_feeds(name, file, feed)?,
         moves: Vec::new(),
         joints,
@@ -53,7 +52,7 @@ pub(super) fn program(
     if file.moves.is_empty() || file.moves.len() > MAX_MOVES {
         let found = file.moves.len();
         let reason = format!("found {found} moves, 1 … {MAX_MOVES} are allowed");
-        return Err(ScenarioError::Move { at: name.to_owned(), reason });
+        return Err(ScenarioError::invalid(name, reason));
     }
     for entry in &file.moves {
         builder.add(entry)?;
@@ -64,65 +63,45 @@ pub(super) fn program(
     if let Some(last) = moves.last_mut() {
         last.dwell += rest;
     }
-    let frame = match file.frame {
-        FrameName::Joints => Frame::Joints,
-        FrameName::Workpiece => Frame::Workpiece,
-    };
     let period = machine.periods().position;
-    let program = Program::plan(Kinematics::new(machine), frame, &joints, period, rest, moves)
-        .map_err(|error| ScenarioError::Plan { name: name.to_owned(), error })?;
+    let program = Program::plan(Kinematics::new(machine), file.frame, &joints, period, rest, moves)
+        .map_err(|error| ScenarioError::invalid(name, error))?;
     let duration = program.duration();
     if duration > MAX_DURATION {
-        return Err(ScenarioError::TooLong { name: name.to_owned(), duration, limit: MAX_DURATION });
+        let found = Rounded(duration);
+        let reason = format!("duration is {found} s, at most {MAX_DURATION} s are allowed");
+        return Err(ScenarioError::invalid(name, reason));
     }
     Ok(program)
 }
 
-/// Value for linear moves and value for rotary moves, in m or rad and s.
-#[derive(Debug, Clone, Copy, Default)]
-struct ByKind<T> {
-    linear: T,
-    rotary: T,
-}
-
-impl<T: Copy> ByKind<T> {
-    fn of(&self, kind: AxisKind) -> T {
-        match kind {
-            AxisKind::Linear => self.linear,
-            AxisKind::Rotary => self.rotary,
-        }
-    }
-}
-
-/// Returns the default feeds of the moves; `replaced` is in m/min or rpm.
+/// Returns the default feeds of linear and of rotary moves; `replaced` is in m/min or rpm.
 fn default_feeds(
     name: &str,
     file: &ScenarioFile,
     replaced: Option<f64>,
-) -> Result<ByKind<Option<f64>>, ScenarioError> {
+) -> Result<[Option<f64>; 2], ScenarioError> {
     let own =
         |entry: &&Spanned<MoveEntry>| entry.value.feed_m_min.is_some() || entry.value.feed_rpm.is_some();
     let Some(feed) = replaced else {
-        return Ok(ByKind {
-            linear: feed_of(name, "feed_m_min", file.feed_m_min, METER_PER_MINUTE)?,
-            rotary: feed_of(name, "feed_rpm", file.feed_rpm, RPM)?,
-        });
+        return Ok([
+            feed_of(name, "feed_m_min", file.feed_m_min, METER_PER_MINUTE)?,
+            feed_of(name, "feed_rpm", file.feed_rpm, RPM)?,
+        ]);
     };
-    let wrong = |at: String, reason: &str| {
-        Err(ScenarioError::Key { at, key: "--feed".to_owned(), reason: reason.to_owned() })
-    };
+    let wrong = |at: &str, reason: &str| Err(ScenarioError::key(at, "--feed", reason));
     if let Some(entry) = file.moves.iter().find(own) {
         let reason =
             "cannot replace the feed of this move; only the default feed of the scenario is replaced";
-        return wrong(at_line(name, entry), reason);
+        return wrong(&at_line(name, entry), reason);
     }
     if file.feed_m_min.is_some() && file.feed_rpm.is_some() {
-        return wrong(name.to_owned(), "cannot replace both feed_m_min and feed_rpm of the scenario");
+        return wrong(name, "cannot replace both feed_m_min and feed_rpm of the scenario");
     }
-    Ok(ByKind {
-        linear: file.feed_m_min.and(feed_of(name, "--feed", Some(YamlNumber(feed)), METER_PER_MINUTE)?),
-        rotary: file.feed_rpm.and(feed_of(name, "--feed", Some(YamlNumber(feed)), RPM)?),
-    })
+    Ok([
+        file.feed_m_min.and(feed_of(name, "--feed", Some(YamlNumber(feed)), METER_PER_MINUTE)?),
+        file.feed_rpm.and(feed_of(name, "--feed", Some(YamlNumber(feed)), RPM)?),
+    ])
 }
 
 struct ProgramBuilder<'a> {
@@ -131,8 +110,9 @@ struct ProgramBuilder<'a> {
     kinds: Vec<AxisKind>,
     /// Start of the next move, programmed coordinates.
     point: Vec<f64>,
-    limits: ByKind<PathLimits>,
-    feeds: ByKind<Option<f64>>,
+    /// Limits and feeds of linear and of rotary moves.
+    limits: [PathLimits; 2],
+    feeds: [Option<f64>; 2],
     moves: Vec<Move>,
 }
 
@@ -143,39 +123,25 @@ impl ProgramBuilder<'_> {
 
     fn add(&mut self, spanned: &Spanned<MoveEntry>) -> Result<(), ScenarioError> {
         let (entry, at) = (&spanned.value, self.at(spanned));
-        let wrong = |reason: &str| ScenarioError::Move { at: at.clone(), reason: reason.to_owned() };
-        let given =
-            [entry.line.is_some(), entry.arc.is_some(), entry.spline.is_some(), entry.dwell_s.is_some()];
-        if given.iter().filter(|&&given| given).count() != 1 {
-            return Err(wrong("a move must have exactly one of line, arc, spline, dwell_s"));
-        }
-        if let Some(YamlNumber(dwell)) = entry.dwell_s {
-            reject_options(entry, "", "a dwell", &at)?;
-            check_time(&at, "dwell_s", dwell)?;
-            let Some(last) = self.moves.last_mut() else {
-                return Err(wrong("dwell_s must follow a move; use rest_s for a rest before the first move"));
-            };
-            last.dwell += dwell;
-            return Ok(());
-        }
+        let block = match (&entry.line, &entry.arc, &entry.spline, entry.dwell_s) {
+            (Some(line), None, None, None) => self.line(line, &at)?,
+            (None, Some(arc), None, None) => self.arc(arc, entry, &at)?,
+            (None, None, Some(points), None) => self.spline(points, &at)?,
+            (None, None, None, Some(YamlNumber(dwell))) => return self.dwell(dwell, entry, &at),
+            _ => {
+                let reason = "a move must have exactly one of line, arc, spline, dwell_s";
+                return Err(ScenarioError::invalid(&at, reason));
+            }
+        };
         let profile = match entry.ramp_s {
             Some(YamlNumber(ramp)) => {
                 check_time(&at, "ramp_s", ramp)?;
                 if ramp == 0.0 {
-                    return Err(value_error(&at, "ramp_s", ramp, "be above 0"));
+                    return Err(ScenarioError::value(&at, "ramp_s", ramp, "be above 0"));
                 }
                 FeedProfile::Cosine { ramp }
             }
             None => FeedProfile::JerkLimited,
-        };
-        let block = if let Some(line) = &entry.line {
-            self.line(line, &at)?
-        } else if let Some(points) = &entry.spline {
-            self.spline(points, &at)?
-        } else if let Some(arc) = &entry.arc {
-            self.arc(arc, entry, &at)?
-        } else {
-            return Err(wrong("a move must have exactly one of line, arc, spline, dwell_s"));
         };
         let kind = block.kind();
         match kind {
@@ -190,31 +156,49 @@ impl ProgramBuilder<'_> {
                 "be at most {} s, the duration of this move at its feed",
                 Rounded(block.length() / feed)
             );
-            return Err(value_error(&at, "ramp_s", ramp, &allowed));
+            return Err(ScenarioError::value(&at, "ramp_s", ramp, &allowed));
         }
         let corner = match kind {
             AxisKind::Linear => feed_of(&at, "corner_m_min", entry.corner_m_min, METER_PER_MINUTE)?,
             AxisKind::Rotary => feed_of(&at, "corner_rpm", entry.corner_rpm, RPM)?,
         };
         block.point(block.length(), &mut self.point);
-        self.moves.push(Move { block, feed, corner, limits: self.limits.of(kind), profile, dwell: 0.0 });
+        self.moves.push(Move {
+            block,
+            feed,
+            corner,
+            limits: self.limits[kind as usize],
+            profile,
+            dwell: 0.0,
+        });
         Ok(())
     }
 
-    fn line(&self, to: &Values, at: &str) -> Result<Block, ScenarioError> {
-        let mut end = self.point.clone();
-        overlay(&mut end, to, &self.joints, at)?;
-        Block::line(&self.point, &end, &self.kinds).map_err(|error| path_error(at, error))
+    fn dwell(&mut self, dwell: f64, entry: &MoveEntry, at: &str) -> Result<(), ScenarioError> {
+        reject_options(entry, "", "a dwell", at)?;
+        check_time(at, "dwell_s", dwell)?;
+        let Some(last) = self.moves.last_mut() else {
+            let reason = "dwell_s must follow a move; use rest_s for a rest before the first move";
+            return Err(ScenarioError::invalid(at, reason));
+        };
+        last.dwell += dwell;
+        Ok(())
     }
 
-    fn spline(&self, points: &[Values], at: &str) -> Result<Block, ScenarioError> {
+    fn line(&self, to: &KeyedNumbers, at: &str) -> Result<Block, ScenarioError> {
+        let mut end = self.point.clone();
+        overlay(&mut end, to, &self.joints, at)?;
+        Block::line(&self.point, &end, &self.kinds).map_err(|error| ScenarioError::invalid(at, error))
+    }
+
+    fn spline(&self, points: &[KeyedNumbers], at: &str) -> Result<Block, ScenarioError> {
         let mut control = Vec::with_capacity(points.len());
         let mut point = self.point.clone();
         for values in points {
             overlay(&mut point, values, &self.joints, at)?;
             control.push(point.clone());
         }
-        Block::spline(&self.point, &control, &self.kinds).map_err(|error| path_error(at, error))
+        Block::spline(&self.point, &control, &self.kinds).map_err(|error| ScenarioError::invalid(at, error))
     }
 
     fn arc(&self, arc: &ArcEntry, entry: &MoveEntry, at: &str) -> Result<Block, ScenarioError> {
@@ -230,34 +214,29 @@ impl ProgramBuilder<'_> {
         });
         let [(first, u), (second, v)] = center[..] else {
             let reason = format!("center must have two coordinates, found {}", center.len());
-            return Err(ScenarioError::Move { at: at.to_owned(), reason });
+            return Err(ScenarioError::invalid(at, reason));
         };
         if let Some(&index) = [first, second].iter().find(|&&index| self.kinds[index] == AxisKind::Rotary) {
             let reason = format!(
                 "center contains {}, a rotary axis; the plane of an arc is spanned by two linear axes",
                 self.joints[index].name
             );
-            return Err(ScenarioError::Move { at: at.to_owned(), reason });
+            return Err(ScenarioError::invalid(at, reason));
         }
         let mut sweep = match (arc.angle_deg, arc.turns) {
             (Some(YamlNumber(angle)), None) => finite(at, "angle_deg", angle)? * DEGREE,
             (None, Some(YamlNumber(turns))) => finite(at, "turns", turns)? * TAU,
             _ => {
-                let reason =
-                    "an arc must have one of angle_deg and turns, positive counterclockwise".to_owned();
-                return Err(ScenarioError::Move { at: at.to_owned(), reason });
+                let reason = "an arc must have one of angle_deg and turns, positive counterclockwise";
+                return Err(ScenarioError::invalid(at, reason));
             }
         };
         let mut end = self.point.clone();
         for (key, &YamlNumber(value)) in &arc.to {
             let (index, value) = coordinate(key, value, &self.joints, at)?;
             if index == first || index == second {
-                return Err(ScenarioError::Key {
-                    at: at.to_owned(),
-                    key: shortened(key),
-                    reason: "lies in the plane of the arc, where the angle determines the end point"
-                        .to_owned(),
-                });
+                let reason = "lies in the plane of the arc, where the angle determines the end point";
+                return Err(ScenarioError::key(at, key, reason));
             }
             end[index] = value;
         }
@@ -271,7 +250,7 @@ impl ProgramBuilder<'_> {
             }
         }
         Block::arc(&self.point, [first, second], [u, v], sweep, &end, &self.kinds)
-            .map_err(|error| path_error(at, error))
+            .map_err(|error| ScenarioError::invalid(at, error))
     }
 
     /// Returns the feed of a move of type `kind`, m/s or rad/s.
@@ -280,21 +259,16 @@ impl ProgramBuilder<'_> {
             AxisKind::Linear => ("feed_m_min", entry.feed_m_min, METER_PER_MINUTE),
             AxisKind::Rotary => ("feed_rpm", entry.feed_rpm, RPM),
         };
-        feed_of(at, key, own, unit)?.or(self.feeds.of(kind)).ok_or_else(|| ScenarioError::Move {
-            at: at.to_owned(),
-            reason: format!("{key} is missing; set it for this move or for the scenario"),
-        })
+        let missing = || format!("{key} is missing; set it for this move or for the scenario");
+        let feed = feed_of(at, key, own, unit)?.or(self.feeds[kind as usize]);
+        feed.ok_or_else(|| ScenarioError::invalid(at, missing()))
     }
 }
 
 /// Rejects options of a move whose keys end in `suffix`, since they do not apply to it.
 fn reject_options(entry: &MoveEntry, suffix: &str, found: &str, at: &str) -> Result<(), ScenarioError> {
     match entry.options().iter().find(|(key, value)| key.ends_with(suffix) && value.is_some()) {
-        Some((key, _)) => Err(ScenarioError::Key {
-            at: at.to_owned(),
-            key: (*key).to_owned(),
-            reason: format!("does not apply to {found}"),
-        }),
+        Some((key, _)) => Err(ScenarioError::key(at, key, &format!("does not apply to {found}"))),
         None => Ok(()),
     }
 }
@@ -303,42 +277,42 @@ fn at_line<T>(name: &str, spanned: &Spanned<T>) -> String {
     yaml::position(name, spanned.referenced.line())
 }
 
-fn path_error(at: &str, error: PathError) -> ScenarioError {
-    ScenarioError::Path { at: at.to_owned(), error }
-}
-
-fn value_error(at: &str, key: &str, value: f64, allowed: &str) -> ScenarioError {
-    ScenarioError::Value { at: at.to_owned(), key: shortened(key), value, allowed: allowed.to_owned() }
-}
-
 fn finite(at: &str, key: &str, value: f64) -> Result<f64, ScenarioError> {
-    if value.is_finite() { Ok(value) } else { Err(value_error(at, key, value, "be a finite number")) }
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(ScenarioError::value(at, key, value, "be a finite number"))
+    }
 }
 
 fn check_time(at: &str, key: &str, value: f64) -> Result<(), ScenarioError> {
     if (0.0..=MAX_DURATION).contains(&value) {
         return Ok(());
     }
-    Err(value_error(at, key, value, &format!("lie in 0 … {MAX_DURATION} s")))
+    Err(ScenarioError::value(at, key, value, &format!("lie in 0 … {MAX_DURATION} s")))
 }
 
 fn feed_of(at: &str, key: &str, value: Option<YamlNumber>, unit: f64) -> Result<Option<f64>, ScenarioError> {
     match value {
         Some(YamlNumber(feed)) if !(feed > 0.0 && feed.is_finite()) => {
-            Err(value_error(at, key, feed, "be a finite number above 0"))
+            Err(ScenarioError::value(at, key, feed, "be a finite number above 0"))
         }
         feed => Ok(feed.map(|YamlNumber(feed)| feed * unit)),
     }
 }
 
+/// Limits along a path: key, kind of the path, true for the jerk, and unit.
+const LIMIT_KEYS: [(&str, AxisKind, bool, f64); 4] = [
+    ("acceleration_m_s2", AxisKind::Linear, false, 1.0),
+    ("acceleration_rev_s2", AxisKind::Rotary, false, REVOLUTION),
+    ("jerk_m_s3", AxisKind::Linear, true, 1.0),
+    ("jerk_rev_s3", AxisKind::Rotary, true, REVOLUTION),
+];
+
 /// Returns a note on each limit that exceeds that of every axis.
-pub(super) fn notes_on_limits(values: &Values, machine: &MachineConfig) -> Vec<String> {
-    let note = |(key, &YamlNumber(value)): (&String, &YamlNumber)| {
-        let (kind, unit) = match key.contains("_rev_") {
-            true => (AxisKind::Rotary, REVOLUTION),
-            false => (AxisKind::Linear, 1.0),
-        };
-        let is_jerk = key.starts_with("jerk");
+pub(super) fn notes_on_limits(values: &KeyedNumbers, machine: &MachineConfig) -> Vec<String> {
+    let note = |(key, kind, is_jerk, unit)| {
+        let &YamlNumber(value) = values.get(key)?;
         let axes = machine.axes().iter().filter(|axis| axis.kind() == kind).map(|axis| axis.limits());
         let limits = axes.map(|limits| if is_jerk { limits.jerk } else { limits.acceleration });
         let largest = limits.fold(0.0, f64::max) / unit;
@@ -347,32 +321,23 @@ pub(super) fn notes_on_limits(values: &Values, machine: &MachineConfig) -> Vec<S
             format!("limits.{key}: {value} exceeds that of the axes, {largest}, which keep their own")
         })
     };
-    values.iter().filter_map(note).collect()
+    LIMIT_KEYS.into_iter().filter_map(note).collect()
 }
 
 /// Parses the path limits, which apply in addition to the axis limits.
-fn path_limits(values: &Values, at: &str) -> Result<ByKind<PathLimits>, ScenarioError> {
-    let mut limits = ByKind::<PathLimits>::default();
+fn path_limits(values: &KeyedNumbers, at: &str) -> Result<[PathLimits; 2], ScenarioError> {
+    let mut limits = [PathLimits::default(); 2];
     for (key, &YamlNumber(value)) in values {
-        let (limit, unit) = match key.as_str() {
-            "acceleration_m_s2" => (&mut limits.linear.acceleration, 1.0),
-            "acceleration_rev_s2" => (&mut limits.rotary.acceleration, REVOLUTION),
-            "jerk_m_s3" => (&mut limits.linear.jerk, 1.0),
-            "jerk_rev_s3" => (&mut limits.rotary.jerk, REVOLUTION),
-            _ => {
-                return Err(ScenarioError::Key {
-                    at: at.to_owned(),
-                    key: shortened(key),
-                    reason: "unknown limit; there are acceleration_m_s2 and jerk_m_s3 for linear paths, \
-                             acceleration_rev_s2 and jerk_rev_s3 for rotary paths"
-                        .to_owned(),
-                });
-            }
+        let Some(&(_, kind, is_jerk, unit)) = LIMIT_KEYS.iter().find(|(known, ..)| known == key) else {
+            let reason = "unknown limit; there are acceleration_m_s2 and jerk_m_s3 for linear paths, \
+                          acceleration_rev_s2 and jerk_rev_s3 for rotary paths";
+            return Err(ScenarioError::key(at, key, reason));
         };
         if !(value > 0.0 && value.is_finite()) {
-            return Err(value_error(at, key, value, "be a finite number above 0"));
+            return Err(ScenarioError::value(at, key, value, "be a finite number above 0"));
         }
-        *limit = value * unit;
+        let limits = &mut limits[kind as usize];
+        *(if is_jerk { &mut limits.jerk } else { &mut limits.acceleration }) = value * unit;
     }
     Ok(limits)
 }

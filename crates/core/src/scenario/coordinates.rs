@@ -1,12 +1,12 @@
 //! Coordinates keyed by joint name and unit, as in `x_mm` and `c_deg`.
 
 use crate::config::AxisKind;
-use crate::text::{nearest_hint, nearest_name, shortened};
+use crate::text::{nearest_hint, nearest_name};
 use crate::trajectory::JointLimits;
 use crate::units::{DEGREE, MILLIMETER};
 
 use super::error::ScenarioError;
-use super::file::Values;
+use super::file::KeyedNumbers;
 use crate::yaml::YamlNumber;
 
 /// Returns the key suffix of a coordinate and its unit in m or rad.
@@ -32,20 +32,12 @@ pub(super) fn coordinate(
     let Some(index) = joints.iter().position(|joint| key_of(joint) == key) else {
         let known: Vec<String> = joints.iter().map(key_of).collect();
         let hint = nearest_hint(&nearest_name(key, &known));
-        return Err(ScenarioError::Key {
-            at: at.to_owned(),
-            key: shortened(key),
-            reason: format!("unknown coordinate; this machine has {}{hint}", known.join(", ")),
-        });
+        let reason = format!("unknown coordinate; this machine has {}{hint}", known.join(", "));
+        return Err(ScenarioError::key(at, key, &reason));
     };
     let scaled = value * unit(joints[index].kind).1;
     if !scaled.is_finite() {
-        return Err(ScenarioError::Value {
-            at: at.to_owned(),
-            key: key.to_owned(),
-            value,
-            allowed: "be a finite number".to_owned(),
-        });
+        return Err(ScenarioError::value(at, key, value, "be a finite number"));
     }
     Ok((index, scaled))
 }
@@ -53,7 +45,7 @@ pub(super) fn coordinate(
 /// Overwrites the coordinates of `point` that `values` contains.
 pub(super) fn overlay(
     point: &mut [f64],
-    values: &Values,
+    values: &KeyedNumbers,
     joints: &[JointLimits],
     at: &str,
 ) -> Result<(), ScenarioError> {

@@ -1,7 +1,6 @@
 //! Errors of scenarios.
 
-use crate::path::{PathError, PlanError};
-use crate::text::nearest_hint;
+use crate::text::{nearest_hint, shortened};
 use crate::units::Rounded;
 
 /// Rejection of a scenario. The text is one line that begins with the file and, if known, the line.
@@ -20,70 +19,30 @@ pub enum ScenarioError {
         /// Names of the built-in scenarios, separated by commas; empty for the name of a file.
         known: String,
     },
-    /// Invalid YAML, an unknown key, or a value of the wrong type.
+    /// Invalid content: its place is the file and, if known, the line.
     #[error("{at}: {reason}")]
-    Syntax {
+    Invalid {
         /// File and line.
         at: String,
-        /// Error of the YAML reader.
+        /// Key and value, if any, and the requirement.
         reason: String,
     },
-    /// Value out of range.
-    #[error("{at}: {key} = {}: must {allowed}", Rounded(*value))]
-    Value {
-        /// File and line.
-        at: String,
-        /// Key.
-        key: String,
-        /// Value.
-        value: f64,
-        /// Requirement, a verb phrase after "must".
-        allowed: String,
-    },
-    /// Key that is invalid for the machine or the move.
-    #[error("{at}: {key}: {reason}")]
-    Key {
-        /// File and line.
-        at: String,
-        /// Key.
-        key: String,
-        /// Reason and allowed keys.
-        reason: String,
-    },
-    /// Incomplete or contradictory move.
-    #[error("{at}: {reason}")]
-    Move {
-        /// File and line.
-        at: String,
-        /// Reason.
-        reason: String,
-    },
-    /// Invalid geometry of a move.
-    #[error("{at}: {error}")]
-    Path {
-        /// File and line.
-        at: String,
-        /// Reason.
-        error: PathError,
-    },
-    /// Duration above the limit.
-    #[error("{name}: duration is {} s, at most {limit} s are allowed", Rounded(*duration))]
-    TooLong {
-        /// Scenario.
-        name: String,
-        /// Duration, s.
-        duration: f64,
-        /// Maximum duration, s.
-        limit: f64,
-    },
-    /// Moves that cannot be joined within the limits.
-    #[error("{name}: {error}")]
-    Plan {
-        /// Scenario.
-        name: String,
-        /// Reason.
-        error: PlanError,
-    },
+}
+
+impl ScenarioError {
+    pub(super) fn invalid(at: &str, reason: impl ToString) -> Self {
+        Self::Invalid { at: at.to_owned(), reason: reason.to_string() }
+    }
+
+    /// Creates the error of a key.
+    pub(super) fn key(at: &str, key: &str, reason: &str) -> Self {
+        Self::invalid(at, format!("{}: {reason}", shortened(key)))
+    }
+
+    /// Creates the error of a value; `allowed` is a verb phrase after "must".
+    pub(super) fn value(at: &str, key: &str, value: f64, allowed: &str) -> Self {
+        Self::invalid(at, format!("{} = {}: must {allowed}", shortened(key), Rounded(value)))
+    }
 }
 
 /// Returns the list of built-in scenarios for a message; empty if `known` is.

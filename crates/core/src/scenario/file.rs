@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use serde_saphyr::Spanned;
 
+use crate::path::Frame;
 use crate::yaml::YamlNumber;
 
 /// Numbers by key, as in `{x_mm: 60, c_deg: 90}`.
-pub(super) type Values = BTreeMap<String, YamlNumber>;
+pub(super) type KeyedNumbers = BTreeMap<String, YamlNumber>;
 
 /// Content of a scenario file.
 #[derive(Debug, Clone, Deserialize)]
@@ -18,38 +19,27 @@ pub(super) struct ScenarioFile {
     #[serde(default)]
     pub source: Option<String>,
     #[serde(default)]
-    pub frame: FrameName,
+    pub frame: Frame,
     #[serde(default)]
-    pub start: Option<Spanned<Values>>,
+    pub start: Option<Spanned<KeyedNumbers>>,
     #[serde(default)]
     pub feed_m_min: Option<YamlNumber>,
     #[serde(default)]
     pub feed_rpm: Option<YamlNumber>,
     #[serde(default)]
-    pub limits: Option<Spanned<Values>>,
+    pub limits: Option<Spanned<KeyedNumbers>>,
     #[serde(default)]
     pub rest_s: Option<YamlNumber>,
     pub moves: Vec<Spanned<MoveEntry>>,
-}
-
-/// Frame of the programmed coordinates.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum FrameName {
-    /// Joint positions.
-    #[default]
-    Joints,
-    /// Tool tip in the workpiece frame for x, y and z, joint positions for a and c.
-    Workpiece,
 }
 
 /// Entry of `moves`: exactly one of `line`, `arc`, `spline` and `dwell_s`, and its options.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct MoveEntry {
-    pub line: Option<Values>,
+    pub line: Option<KeyedNumbers>,
     pub arc: Option<ArcEntry>,
-    pub spline: Option<Vec<Values>>,
+    pub spline: Option<Vec<KeyedNumbers>>,
     pub dwell_s: Option<YamlNumber>,
     pub feed_m_min: Option<YamlNumber>,
     pub feed_rpm: Option<YamlNumber>,
@@ -75,11 +65,11 @@ impl MoveEntry {
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ArcEntry {
-    pub center: Values,
+    pub center: KeyedNumbers,
     #[serde(default)]
     pub angle_deg: Option<YamlNumber>,
     #[serde(default)]
     pub turns: Option<YamlNumber>,
     #[serde(default)]
-    pub to: Values,
+    pub to: KeyedNumbers,
 }

@@ -1,7 +1,7 @@
 //! Scenarios: test motions in YAML files.
 //!
 //! A scenario file contains a start point, a feed and moves. [`Scenario::program`] plans its path and feed profile for
-//! a machine. The test motions of Prévost et al. are built in, from `config/scenarios`.
+//! a machine. `virtual_axes_builtin::SCENARIOS` has the test motions of Prévost et al.
 //!
 //! ```yaml
 //! description: Line, half circle and return line
@@ -23,31 +23,11 @@ use std::path::Path as FilePath;
 
 use crate::config::MachineConfig;
 use crate::path::Program;
-use crate::text::nearest_name;
+use crate::text::{BuiltinFiles, builtin_names, builtin_text, nearest_name};
 use crate::yaml;
 
 pub use error::ScenarioError;
 
-/// Built-in scenarios: name and file, in the order of the figures in Prévost et al.
-const BUILTIN: &[(&str, &str)] = &[
-    ("x-constant", include_str!("../../config/scenarios/x-constant.yaml")),
-    ("y-constant", include_str!("../../config/scenarios/y-constant.yaml")),
-    ("z-constant", include_str!("../../config/scenarios/z-constant.yaml")),
-    ("a-constant", include_str!("../../config/scenarios/a-constant.yaml")),
-    ("c-constant", include_str!("../../config/scenarios/c-constant.yaml")),
-    ("c-two-speeds", include_str!("../../config/scenarios/c-two-speeds.yaml")),
-    ("x-there-and-back", include_str!("../../config/scenarios/x-there-and-back.yaml")),
-    ("contour-a", include_str!("../../config/scenarios/contour-a.yaml")),
-    ("contour-b", include_str!("../../config/scenarios/contour-b.yaml")),
-    ("orientation-ac", include_str!("../../config/scenarios/orientation-ac.yaml")),
-    ("bspline-3d", include_str!("../../config/scenarios/bspline-3d.yaml")),
-    ("ballbar", include_str!("../../config/scenarios/ballbar.yaml")),
-    ("ballbar-both", include_str!("../../config/scenarios/ballbar-both.yaml")),
-    ("corner-90", include_str!("../../config/scenarios/corner-90.yaml")),
-    ("corner-45", include_str!("../../config/scenarios/corner-45.yaml")),
-    ("five-axis", include_str!("../../config/scenarios/five-axis.yaml")),
-    ("bspline-5x", include_str!("../../config/scenarios/bspline-5x.yaml")),
-];
 /// Maximum size of a scenario file.
 const MAX_FILE_BYTES: u64 = 16 << 20;
 
@@ -59,41 +39,28 @@ pub struct Scenario {
 }
 
 impl Scenario {
-    /// Returns the names of the built-in scenarios.
-    pub fn builtin_names() -> impl Iterator<Item = &'static str> {
-        BUILTIN.iter().map(|(name, _)| *name)
-    }
-
-    /// Returns the built-in scenario `name`.
+    /// Returns the YAML text of the scenario `name` of `builtin`.
     ///
     /// # Errors
     /// [`ScenarioError::Unknown`].
-    pub fn builtin(name: &str) -> Result<Self, ScenarioError> {
-        Self::from_yaml(Self::builtin_text(name)?, name)
+    pub fn builtin_text(name: &str, builtin: &BuiltinFiles) -> Result<&'static str, ScenarioError> {
+        builtin_text(builtin, name).ok_or_else(|| unknown(name, builtin, "unknown scenario"))
     }
 
-    /// Returns the YAML text of the built-in scenario `name`.
+    /// Loads the scenario `name` of `builtin`, or the file `name` if there is none.
     ///
     /// # Errors
-    /// [`ScenarioError::Unknown`].
-    pub fn builtin_text(name: &str) -> Result<&'static str, ScenarioError> {
-        let found = BUILTIN.iter().find(|(known, _)| *known == name);
-        found.map(|(_, text)| *text).ok_or_else(|| unknown(name, "unknown scenario"))
-    }
-
-    /// Loads the built-in scenario `name`, or the file `name` if there is none.
-    ///
-    /// # Errors
-    /// [`ScenarioError::Unknown`] if the file cannot be read, [`ScenarioError::Syntax`] if it is not a scenario.
-    pub fn load(name: &str) -> Result<Self, ScenarioError> {
-        if Self::builtin_names().any(|known| known == name) {
-            return Self::builtin(name);
+    /// [`ScenarioError::Unknown`] if the file cannot be read, [`ScenarioError::Invalid`] if it is not a scenario.
+    pub fn load(name: &str, builtin: &BuiltinFiles) -> Result<Self, ScenarioError> {
+        if let Some(text) = builtin_text(builtin, name) {
+            return Self::from_yaml(text, name);
         }
-        let failed = |error: std::io::Error| unknown(name, &error.to_string());
+        let failed = |error: std::io::Error| unknown(name, builtin, &error.to_string());
         let length = std::fs::metadata(FilePath::new(name)).map_err(failed)?.len();
         if length > MAX_FILE_BYTES {
             return Err(unknown(
                 name,
+                builtin,
                 &format!("size is {length} bytes, at most {MAX_FILE_BYTES} are allowed"),
             ));
         }
@@ -103,10 +70,10 @@ impl Scenario {
     /// Parses the text of a scenario file; messages name it `name`.
     ///
     /// # Errors
-    /// [`ScenarioError::Syntax`].
+    /// [`ScenarioError::Invalid`].
     pub fn from_yaml(text: &str, name: &str) -> Result<Self, ScenarioError> {
         let file = yaml::document(text)
-            .map_err(|error| ScenarioError::Syntax { at: error.position(name), reason: error.reason })?;
+            .map_err(|error| ScenarioError::Invalid { at: error.position(name), reason: error.reason })?;
         Ok(Scenario { name: name.to_owned(), file })
     }
 
@@ -166,15 +133,15 @@ pub fn nearest_input<'a>(name: &str, builtin: impl Iterator<Item = &'a str>) -> 
     same.cloned().or_else(|| nearest_name(name, builtin.map(str::to_owned).chain(files.iter().cloned())))
 }
 
-fn unknown(name: &str, reason: &str) -> ScenarioError {
+fn unknown(name: &str, builtin: &BuiltinFiles, reason: &str) -> ScenarioError {
     ScenarioError::Unknown {
         name: name.to_owned(),
         reason: reason.to_owned(),
-        nearest: nearest_input(name, Scenario::builtin_names()),
+        nearest: nearest_input(name, builtin_names(builtin)),
         known: if is_file_name(name) {
             String::new()
         } else {
-            Scenario::builtin_names().collect::<Vec<_>>().join(", ")
+            builtin_names(builtin).collect::<Vec<_>>().join(", ")
         },
     }
 }

@@ -4,47 +4,27 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use pulp::Simd;
 
-use super::{SimdLoad, SimdReal};
+use super::real::SimdReal;
+use super::vector::SimdLoad;
 
 /// Pair of independent values; interleaving their operations hides instruction latency.
 #[derive(Debug, Clone, Copy)]
 pub struct Unroll2<N>(N, N);
 
-impl<N: SimdReal> Add for Unroll2<N> {
-    type Output = Self;
+macro_rules! operators {
+    ($($trait:ident $method:ident),*) => {$(
+        impl<N: SimdReal> $trait for Unroll2<N> {
+            type Output = Self;
 
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Unroll2(self.0 + other.0, self.1 + other.1)
-    }
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Unroll2(self.0.$method(other.0), self.1.$method(other.1))
+            }
+        }
+    )*};
 }
 
-impl<N: SimdReal> Sub for Unroll2<N> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Unroll2(self.0 - other.0, self.1 - other.1)
-    }
-}
-
-impl<N: SimdReal> Mul for Unroll2<N> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Unroll2(self.0 * other.0, self.1 * other.1)
-    }
-}
-
-impl<N: SimdReal> Div for Unroll2<N> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        Unroll2(self.0 / other.0, self.1 / other.1)
-    }
-}
+operators!(Add add, Sub sub, Mul mul, Div div);
 
 impl<N: SimdReal> Neg for Unroll2<N> {
     type Output = Self;

@@ -4,7 +4,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use pulp::Simd;
 
-use super::SimdReal;
+use super::real::SimdReal;
 
 /// Lanes of the widest supported vector.
 const MAX_LANES: usize = 8;
@@ -55,41 +55,20 @@ impl<S: Simd> Vector<S> {
     }
 }
 
-impl<S: Simd> Add for Vector<S> {
-    type Output = Self;
+macro_rules! operators {
+    ($($trait:ident $method:ident $lanes:ident),*) => {$(
+        impl<S: Simd> $trait for Vector<S> {
+            type Output = Self;
 
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.with(self.simd.add_f64s(self.value, other.value))
-    }
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                self.with(self.simd.$lanes(self.value, other.value))
+            }
+        }
+    )*};
 }
 
-impl<S: Simd> Sub for Vector<S> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.with(self.simd.sub_f64s(self.value, other.value))
-    }
-}
-
-impl<S: Simd> Mul for Vector<S> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.with(self.simd.mul_f64s(self.value, other.value))
-    }
-}
-
-impl<S: Simd> Div for Vector<S> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        self.with(self.simd.div_f64s(self.value, other.value))
-    }
-}
+operators!(Add add add_f64s, Sub sub sub_f64s, Mul mul mul_f64s, Div div div_f64s);
 
 impl<S: Simd> Neg for Vector<S> {
     type Output = Self;

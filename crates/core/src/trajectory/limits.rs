@@ -34,6 +34,12 @@ impl JointLimits {
         }
     }
 
+    /// Returns true for a rotary joint without travel limits, on which angles that differ by whole turns are the same place.
+    pub fn is_continuous(&self) -> bool {
+        let is_unlimited = self.limits.travel_min.is_infinite() && self.limits.travel_max.is_infinite();
+        self.kind == AxisKind::Rotary && is_unlimited
+    }
+
     /// Returns the largest accepted speed, m/s or rad/s: Vmax plus its tolerance.
     pub fn speed_bound(&self) -> f64 {
         self.limits.velocity * (1.0 + SPEED_TOLERANCE)

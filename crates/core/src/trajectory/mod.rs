@@ -20,12 +20,13 @@
 //! | `joint_trajectory` | validated trajectory |
 //! | `validation` | validation of a request |
 //! | `feed_override`, `path_time` | control of the feed override, path time |
-//! | `plan` | plan of one joint |
-//! | `motion_chunks` | motion that is planned while it runs |
+//! | `chunk` | chunk of a motion that is planned while it runs |
+//! | `plan` | plan of one joint, and its queue |
 //! | `motion_table` | accepted motions |
 //! | `preview`, `stream_gate`, `stream` | streamed setpoints |
 //! | `path_clock`, `timeline` | path time, queues and setpoints of all joints |
-//! | `cancel`, `submit` | cancellation and acceptance |
+//! | `ahead` | feed override, setpoints planned ahead |
+//! | `cancel`, `submit`, `motion_chunks` | cancellation and acceptance; motions that are planned while they run |
 
 pub mod event;
 pub mod feed_override;
@@ -37,7 +38,9 @@ pub mod stop;
 pub mod stream;
 pub mod timeline;
 
+mod ahead;
 mod cancel;
+mod chunk;
 mod joint_trajectory;
 mod motion_chunks;
 mod motion_table;
@@ -50,11 +53,12 @@ mod submit;
 mod validation;
 
 pub use cancel::CancelOutcome;
+pub use chunk::{MotionChunk, PathPlace};
 pub use event::{JointSet, MotionId, TimelineEvent};
 pub use feed_override::{InvalidFeedOverride, MAX_FEED_OVERRIDE, check_feed_override};
 pub use joint_trajectory::Trajectory;
 pub use limits::JointLimits;
-pub use motion_chunks::{MotionChunk, PathPlace};
+
 pub use rejection::{Rejection, RejectionCode};
 pub use request::{Start, TrajectoryPoint, TrajectoryRequest};
 pub use spline::KinematicState;

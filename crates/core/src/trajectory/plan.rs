@@ -1,12 +1,14 @@
 //! Plan of one joint from an instant on: a pure function of the position cycle, or of the path time for a trajectory.
 
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use super::chunk::ChunkColumn;
 use super::joint_trajectory::Trajectory;
-use super::motion_chunks::ChunkColumn;
 use super::path_time::{PathTime, PlanInstant};
 use super::spline::{KinematicState, Segment};
 use super::stop::Stop;
 use crate::units::{Nanoseconds, SECOND_NS, seconds};
-use std::sync::Arc;
 
 /// Entry of the plan queue of a joint.
 #[derive(Debug, Clone)]
@@ -47,6 +49,8 @@ pub(super) struct TrajectoryColumn {
     pub cursor: usize,
     /// Approach from the commanded state to a later first point, and its local start time, ns.
     pub approach: Option<(Nanoseconds, Segment)>,
+    /// Angle of whole turns that is added to the positions of a continuous joint, rad.
+    pub turns: f64,
 }
 
 impl TrajectoryColumn {
@@ -57,6 +61,12 @@ impl TrajectoryColumn {
 
     /// Returns the state at local `time`.
     pub fn state(&self, time: PathTime) -> KinematicState {
+        let state = self.state_of_points(time);
+        KinematicState { position: state.position + self.turns, ..state }
+    }
+
+    /// Returns the state at local `time` without the whole turns.
+    fn state_of_points(&self, time: PathTime) -> KinematicState {
         if let Some((begin, segment)) = &self.approach
             && time.ns < self.trajectory.first_time()
         {
@@ -79,7 +89,7 @@ impl TrajectoryColumn {
         if is_on_points && (time.ns < trajectory.duration() || trajectory.final_stop(self.column).is_none()) {
             let index = trajectory.locate(time.ns, near.unwrap_or(self.cursor));
             *near = Some(index);
-            return trajectory.position_after(self.column, time, index);
+            return trajectory.position_after(self.column, time, index) + self.turns;
         }
         self.state(time).position
     }
@@ -172,4 +182,33 @@ impl JointPlan {
 /// Returns the time between two instants, ns, saturating.
 pub(super) fn elapsed(from_k: i64, to_k: i64, period: Nanoseconds) -> Nanoseconds {
     to_k.saturating_sub(from_k).saturating_mul(period)
+}
+
+/// Plan queue and last commanded state of one joint.
+#[derive(Debug, Clone)]
+pub(super) struct JointQueue {
+    /// Plans of the joint; the first one commands it.
+    pub plans: VecDeque<JointPlan>,
+    /// State commanded at the last instant.
+    pub state: KinematicState,
+}
+
+impl JointQueue {
+    /// Returns the position at the end of a controlled stop, otherwise that of the last instant, m or rad.
+    pub fn end_position(&self) -> f64 {
+        match self.plans.back() {
+            Some(JointPlan { kind: PlanKind::Stop { stop, .. }, .. }) => stop.state(f64::INFINITY).position,
+            _ => self.state.position,
+        }
+    }
+
+    /// Returns the plan that commands the joint at instant `path_k` of the path time.
+    #[inline]
+    pub fn plan_at(&self, path_k: i64) -> Option<&JointPlan> {
+        if self.plans.len() == 1 {
+            return self.plans.front();
+        }
+        let after = self.plans.partition_point(|plan| plan.has_joined(path_k));
+        self.plans.get(after.saturating_sub(1))
+    }
 }

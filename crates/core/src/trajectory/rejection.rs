@@ -55,8 +55,8 @@ rejection_codes! {
     EndedInThePast = 10, "ENDED_IN_THE_PAST", "the last point is in the past";
     TooManyPoints = 11, "TOO_MANY_POINTS", "more points than `max_points`";
     VelocityAtEnd = 12, "VELOCITY_AT_END",
-        "the last velocity is not zero, and `allow_nonzero_velocity_at_trajectory_end` is false";
-    InvalidTime = 13, "INVALID_TIME", "a time outside the range of 64-bit nanoseconds, or an invalid `nanosec` field";
+        "the last velocity exceeds 1e-6 m/s or rad/s, and `allow_nonzero_velocity_at_trajectory_end` is false";
+    InvalidTime = 13, "INVALID_TIME", "a time outside the range of 64-bit nanoseconds, an invalid `nanosec` field, or a start more than 100 h ahead";
     QueueFull = 14, "QUEUE_FULL",
         "1024 trajectories wait for the same joint, or 64 for the first `/clock`; or 8192 trajectories, or \
          4 × `max_points` points, are active or waiting in all";

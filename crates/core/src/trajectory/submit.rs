@@ -11,11 +11,19 @@ use super::stream::StreamEnd;
 use super::timeline::{MAX_WAITING, Timeline};
 use super::validation::check_samples;
 use crate::units::{Nanoseconds, Rounded, SECOND_NS, seconds};
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Number of instants checked between the start and a later first point. For a single polynomial this
 /// bounds the error to 10⁻³ of its largest speed: see [`Trajectory::new`].
 const APPROACH_SAMPLES: i64 = 256;
+
+/// Difference from the present time at which a stamp is of another clock, ns: 100 h, the longest trajectory of a file.
+const OTHER_CLOCK: i128 = 360_000 * SECOND_NS as i128;
+const OTHER_CLOCK_HINT: &str =
+    "; the stamp may be of another clock: set use_sim_time of both nodes, or of neither";
+/// Largest number of whole turns between a trajectory and a continuous joint; the angles of more would be inexact.
+const MAX_TURNS: f64 = 1e6;
 
 /// Position cycles of an accepted trajectory, with the feed override 1 from its acceptance on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,6 +57,8 @@ impl Timeline {
     ///   before its start are completed. Joints that the trajectory does not name are not affected.
     /// - A first point later than the start is approached from the commanded state by a segment of the
     ///   degree of the point.
+    /// - A trajectory that begins at its first point moves by the whole turns that bring this point nearest to the commanded
+    ///   position of a continuous joint; a later first point is an absolute angle.
     /// - A last point in motion without a successor is followed by a controlled stop.
     /// - A trajectory without points is a controlled stop of the named joints, or of all joints, from the
     ///   last commanded state, independent of its stamp. It ends all active and waiting motions of the
@@ -160,14 +170,27 @@ impl Timeline {
                 "the start is too far from the present time to be counted in position cycles",
             ));
         };
+        let now = i128::from(next_k) * period;
         if end_k < next_k {
-            let ago = i128::from(next_k) * period - nominal_end;
-            let ago = ago as f64 / SECOND_NS as f64;
+            let ago = (now - nominal_end) as f64 / SECOND_NS as f64;
+            let hint = if now - nominal_end > OTHER_CLOCK { OTHER_CLOCK_HINT } else { "" };
             return Err(Rejection::new(
                 RejectionCode::EndedInThePast,
-                format!("its last point is {} s before the next position cycle", Rounded(ago)),
+                format!("its last point is {} s before the next position cycle{hint}", Rounded(ago)),
             )
             .numbers(ago, 0.0));
+        }
+        if nominal_start - now > OTHER_CLOCK {
+            let (ahead, limit) =
+                ((nominal_start - now) as f64 / SECOND_NS as f64, OTHER_CLOCK as f64 / SECOND_NS as f64);
+            return Err(Rejection::new(
+                RejectionCode::InvalidTime,
+                format!(
+                    "its start is {} s after the next position cycle, at most {limit} s are allowed{OTHER_CLOCK_HINT}",
+                    Rounded(ahead)
+                ),
+            )
+            .numbers(ahead, limit));
         }
         let join_k = start_k.max(next_k);
         let is_late = join_k > start_k;
@@ -206,6 +229,7 @@ impl Timeline {
             start_k,
             cursor: 0,
             approach: None,
+            turns: 0.0,
         };
         let begin = elapsed(start_k, join_k, self.period);
         if begin < trajectory.first_time() {
@@ -220,7 +244,12 @@ impl Timeline {
             self.check_approach(joint, &path, begin, &segment)?;
         } else {
             let before = self.predicted(joint, join_k - 1).position;
-            let first = path.state(begin.into()).position;
+            let mut first = path.state(begin.into()).position;
+            let turns = ((before - first) / TAU).round();
+            if limits.is_continuous() && turns.abs() <= MAX_TURNS {
+                path.turns = turns * TAU;
+                first += path.turns;
+            }
             let index = trajectory.locate(begin, 0);
             limits.check_jump(index, before, first, seconds(self.period))?;
         }

@@ -5,7 +5,7 @@ use super::limits::JointLimits;
 use super::motion_table::{MotionTable, Release};
 use super::path_clock::PathClock;
 use super::path_time::PlanInstant;
-use super::plan::{JointPlan, PlanKind};
+use super::plan::{JointPlan, JointQueue, PlanKind};
 use super::rejection::{Rejection, RejectionCode};
 use super::spline::KinematicState;
 use super::stop::StopPlanner;
@@ -43,25 +43,6 @@ pub struct Timeline {
     events: Vec<TimelineEvent>,
     /// Events since the last instant, reported at the next one.
     pub(super) pending: Vec<TimelineEvent>,
-}
-
-/// Plan queue and last commanded state of one joint.
-#[derive(Debug, Clone)]
-pub(super) struct JointQueue {
-    /// Plans of the joint; the first one commands it.
-    pub plans: VecDeque<JointPlan>,
-    /// State commanded at the last instant.
-    pub state: KinematicState,
-}
-
-impl JointQueue {
-    /// Returns the position at the end of a controlled stop, otherwise that of the last instant, m or rad.
-    pub fn end_position(&self) -> f64 {
-        match self.plans.back() {
-            Some(JointPlan { kind: PlanKind::Stop { stop, .. }, .. }) => stop.state(f64::INFINITY).position,
-            _ => self.state.position,
-        }
-    }
 }
 
 /// Invalid arguments of [`Timeline::new`].
@@ -151,7 +132,7 @@ impl Timeline {
             plan.advance(instant, period);
             queue.state = match plan.kind {
                 PlanKind::Hold(newest) => self.stream.next_state(joint, k, newest, queue.state.position),
-                _ => Self::state_of(&self.clock, plan, instant, period),
+                _ => self.clock.state_of(plan, instant, period),
             };
             self.psec[joint] = queue.state.position;
             if plan.has_ended(instant, period)

@@ -13,6 +13,8 @@ use crate::units::{Nanoseconds, Rounded, seconds};
 const BUDGET: usize = 1 << 22;
 /// Smallest number of instants checked of a longer segment; see [`Trajectory::new`] for the error.
 const MIN_SHARE: usize = 64;
+/// Largest velocity at the end of a trajectory that counts as zero, m/s or rad/s: what planners leave by rounding.
+const MAX_RESIDUAL_VELOCITY: f64 = 1e-6;
 
 /// Machine and options for the validation of a trajectory.
 #[derive(Debug, Clone, Copy)]
@@ -124,15 +126,15 @@ impl ColumnCheck<'_> {
     fn end(&self, allow_nonzero_velocity: bool) -> Result<(), Rejection> {
         let last = self.trajectory.points() - 1;
         let velocity = self.trajectory.point(self.column, last).velocity;
-        if velocity == 0.0 || allow_nonzero_velocity {
+        if velocity.abs() <= MAX_RESIDUAL_VELOCITY || allow_nonzero_velocity {
             return Ok(());
         }
         let (name, unit) = (&self.joint.name, self.joint.unit());
         Err(Rejection::new(
             RejectionCode::VelocityAtEnd,
             format!(
-                "{name}, point {last}: the velocity at the end is {} {unit}/s; it must be zero unless \
-                 allow_nonzero_velocity_at_trajectory_end is set",
+                "{name}, point {last}: the velocity at the end is {} {unit}/s; it must be zero (within \
+                 {MAX_RESIDUAL_VELOCITY:e}) unless allow_nonzero_velocity_at_trajectory_end is set",
                 Rounded(velocity)
             ),
         )

@@ -3,7 +3,6 @@
 use crate::config::Periods;
 use crate::machine::Machine;
 use crate::path::Program;
-use crate::simd::AlignedBuffer;
 use crate::units::{Nanoseconds, seconds};
 
 /// Search range beyond the current setpoint, m or rad: an axis that overshoots a corner is closest to a
@@ -47,7 +46,7 @@ pub(super) struct PositionCycle {
     /// computed.
     until: Vec<Option<f64>>,
     /// Positions at its ticks, axis by axis, m or rad.
-    pub positions: AlignedBuffer,
+    pub positions: Vec<f64>,
 }
 
 impl PositionCycle {
@@ -57,7 +56,7 @@ impl PositionCycle {
             is_moving: false,
             times: TickTimes { start: 0, tick: periods.current, count: ticks },
             until: vec![None; ticks],
-            positions: AlignedBuffer::new(ticks * axes),
+            positions: vec![0.0; ticks * axes],
         }
     }
 

@@ -64,8 +64,8 @@ pub enum Reference {
     Setpoints,
 }
 
-/// Contour error: distance of the tool tip from the path in the workpiece frame, at every tick of the whole
-/// run.
+/// Contour error: distance of the tool tip from the path in the workpiece frame, at every tick of the whole run. Where
+/// setpoints at feed and at rapid traverse are distinguished, that of the motions at feed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContourFigures {
     /// Reference of the contour error.
@@ -78,6 +78,17 @@ pub struct ContourFigures {
     pub max_within_ends: f64,
     /// RMS contour error without overshoot beyond the path's two ends, m.
     pub rms_within_ends: f64,
+    /// Contour error at rapid traverse; `None` without rapid traverse, or without anything else.
+    pub rapids: Option<RapidFigures>,
+}
+
+/// Contour error at rapid traverse.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RapidFigures {
+    /// Largest contour error, m.
+    pub max: f64,
+    /// RMS contour error, m.
+    pub rms: f64,
 }
 
 /// Orientation error: angle between the tool axis and that of the path at its nearest point, at every tick.

@@ -19,7 +19,7 @@ mod variants;
 pub use definition::{Measures, Tick, Trial, TrialError, TrialOutcome};
 pub use figures::{
     AxisFigures, BidirectionalFigures, CircleFigures, ContourFigures, CornerFigures, Figures,
-    OrientationFigures, Reference,
+    OrientationFigures, RapidFigures, Reference,
 };
 pub use run::{run, run_compensated, trace};
 pub use setpoints::{

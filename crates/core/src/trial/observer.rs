@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::assess::{AxisAssessor, NearestPoint, PathDeviations, PathTracker, SetpointTracker};
+use crate::assess::{AxisAssessor, NearestPoint, PathDeviations, PathTracker, SetpointTracker, StandingTurn};
 use crate::config::{AxisKind, MachineConfig};
-use crate::kinematics::{AxisRole, Kinematics, Poses, TableAngles};
+use crate::kinematics::{AxisRole, Kinematics, Poses, RotaryAngles, ToolPose};
 use crate::machine::Machine;
 use crate::path::Frame;
-use crate::simd::{LANES, SliceOperation, vectorize};
+use crate::simd::LANES;
 use crate::simulation::{Simulation, contour_preview_cycles};
 use crate::statistics::rms_of_sum;
 use crate::units::seconds;
@@ -16,7 +16,7 @@ use super::circle::Circles;
 use super::corner::Corners;
 use super::cycle::PositionCycle;
 use super::definition::{Measures, Trial, TrialOutcome};
-use super::figures::{AxisFigures, ContourFigures, Figures, OrientationFigures, Reference};
+use super::figures::{AxisFigures, ContourFigures, Figures, OrientationFigures, RapidFigures, Reference};
 use super::recorder::{SignalRecorder, ToolSample};
 
 /// Largest value and RMS of an error, in one part per lane.
@@ -28,42 +28,23 @@ struct ErrorStatistics {
 }
 
 impl ErrorStatistics {
+    fn add(&mut self, errors: &[f64]) {
+        for group in errors.chunks(LANES) {
+            for (k, &error) in group.iter().enumerate() {
+                // NaN is not larger.
+                self.max[k] = if error > self.max[k] { error } else { self.max[k] };
+                self.sum_of_squares[k] += error * error;
+            }
+        }
+        self.count += errors.len() as u64;
+    }
+
     fn max(&self) -> f64 {
         self.max.into_iter().fold(0.0, f64::max)
     }
 
     fn rms(&self) -> f64 {
         rms_of_sum(self.sum_of_squares.into_iter().sum(), self.count).unwrap_or(0.0)
-    }
-}
-
-/// Addition of errors to their statistics.
-struct ErrorAddition<'a> {
-    errors: &'a [f64],
-    statistics: &'a mut ErrorStatistics,
-}
-
-impl SliceOperation for ErrorAddition<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let ErrorAddition { errors, statistics } = self;
-        let (groups, rest) = errors.as_chunks::<LANES>();
-        let (mut max, mut sums) = (statistics.max, statistics.sum_of_squares);
-        for group in groups {
-            for k in 0..LANES {
-                // NaN is not larger.
-                max[k] = if group[k] > max[k] { group[k] } else { max[k] };
-                sums[k] += group[k] * group[k];
-            }
-        }
-        for (k, &error) in rest.iter().enumerate() {
-            max[k] = if error > max[k] { error } else { max[k] };
-            sums[k] += error * error;
-        }
-        (statistics.max, statistics.sum_of_squares) = (max, sums);
-        statistics.count += errors.len() as u64;
     }
 }
 
@@ -79,7 +60,7 @@ enum Tracker {
 pub(super) struct Observer<'a> {
     trial: &'a Trial<'a>,
     kinematics: Kinematics,
-    rotated: TableAngles,
+    rotated: RotaryAngles,
     tracker: Option<Tracker>,
     tick: f64,
     end: f64,
@@ -100,6 +81,12 @@ pub(super) struct Observer<'a> {
     deviations: PathDeviations,
     contour: ErrorStatistics,
     within_ends: ErrorStatistics,
+    /// Contour errors at rapid traverse.
+    rapids: ErrorStatistics,
+    /// True if the tool moves at feed.
+    has_cuts: bool,
+    rapids_within_ends: ErrorStatistics,
+    turn: StandingTurn,
     orientation: ErrorStatistics,
     circles: Circles,
     corners: Corners,
@@ -122,7 +109,7 @@ impl<'a> Observer<'a> {
         Observer {
             trial,
             tracker,
-            rotated: TableAngles::default(),
+            rotated: RotaryAngles::default(),
             tick: seconds(machine.periods().current),
             end: 0.0,
             axes: vec![AxisAssessor::default(); count],
@@ -137,6 +124,10 @@ impl<'a> Observer<'a> {
             deviations: PathDeviations::default(),
             contour: ErrorStatistics::default(),
             within_ends: ErrorStatistics::default(),
+            rapids: ErrorStatistics::default(),
+            has_cuts: program.is_some(),
+            rapids_within_ends: ErrorStatistics::default(),
+            turn: StandingTurn::default(),
             orientation: ErrorStatistics::default(),
             circles: circles.map(|p| Circles::of(p, machine)).unwrap_or_default(),
             // Without a tool there is no contour error at corners.
@@ -181,7 +172,14 @@ impl<'a> Observer<'a> {
                 &mut self.poses,
             );
         }
-        let first = self.follow(cycle);
+        let turned = self.turn.is_turning(cycle.times.at(0)).then(|| {
+            let delayed = |index| {
+                let (machine, at) = axis(index);
+                machine.axis(at).sample().delayed_psec
+            };
+            self.kinematics.forward(&(0..self.axes.len()).map(delayed).collect::<Vec<_>>())
+        });
+        let first = self.follow(cycle, turned.as_ref());
         if let Some(recorder) = &mut self.recorder {
             let axes = (0..self.axes.len()).map(|index| {
                 let (machine, at) = axis(index);
@@ -204,19 +202,45 @@ impl<'a> Observer<'a> {
     }
 
     /// Adds the tool poses; returns the nearest point at the first tick.
-    fn follow(&mut self, cycle: &mut PositionCycle) -> Option<NearestPoint> {
+    ///
+    /// `turned` is the pose of the same time for the orientation of a standing tip.
+    fn follow(&mut self, cycle: &mut PositionCycle, turned: Option<&ToolPose>) -> Option<NearestPoint> {
         let (poses, deviations) = (&self.poses, &mut self.deviations);
-        let first = match (self.tracker.as_mut()?, &self.trial.program) {
+        let mut first = match (self.tracker.as_mut()?, &self.trial.program) {
             (Tracker::Path(tracker), Some(program)) => {
-                tracker.follow(poses, |tick| cycle.until(program, tick), deviations)?.first
+                tracker.follow(poses, |tick| cycle.until(program, tick), deviations)?
             }
             (Tracker::Setpoints(tracker), _) => tracker.follow(poses, deviations)?,
             (Tracker::Path(_), None) => return None,
         };
-        let statistics = [&mut self.contour, &mut self.within_ends, &mut self.orientation];
-        let errors = [&deviations.distance, &deviations.within_ends, &deviations.orientation];
-        for (statistics, errors) in statistics.into_iter().zip(errors) {
-            vectorize(ErrorAddition { errors, statistics });
+        if let Some(turned) = turned {
+            first.axis = turned.axis;
+            first.orientation = Kinematics::orientation_error(&turned.axis, &poses.get(0).axis);
+            deviations.orientation.fill(first.orientation);
+        }
+        self.orientation.add(&deviations.orientation);
+        let mut rapid = match &self.tracker {
+            Some(Tracker::Setpoints(tracker)) => Some(tracker.rapid().peekable()),
+            _ => None,
+        };
+        let mut begin = 0;
+        while begin < deviations.distance.len() {
+            // Ticks in a row of the same kind.
+            let (mut end, mut is_rapid) = (deviations.distance.len(), false);
+            if let Some(rapid) = &mut rapid {
+                is_rapid = rapid.next().unwrap_or(false);
+                end = begin + 1;
+                while rapid.next_if_eq(&is_rapid).is_some() {
+                    end += 1;
+                }
+            }
+            let [contour, within_ends] = match is_rapid {
+                true => [&mut self.rapids, &mut self.rapids_within_ends],
+                false => [&mut self.contour, &mut self.within_ends],
+            };
+            contour.add(&deviations.distance[begin..end]);
+            within_ends.add(&deviations.within_ends[begin..end]);
+            begin = end;
         }
         self.corners.observe(cycle.times, &deviations.within_ends);
         Some(first)
@@ -255,13 +279,7 @@ impl<'a> Observer<'a> {
         Figures {
             duration: self.end,
             axes: axes.collect(),
-            contour: reference.map(|reference| ContourFigures {
-                reference,
-                max: self.contour.max(),
-                rms: self.contour.rms(),
-                max_within_ends: self.within_ends.max(),
-                rms_within_ends: self.within_ends.rms(),
-            }),
+            contour: reference.map(|reference| self.contour_figures(reference)),
             orientation: has_orientation
                 .then(|| OrientationFigures { max: self.orientation.max(), rms: self.orientation.rms() }),
             circles: self.circles.figures(),
@@ -272,6 +290,25 @@ impl<'a> Observer<'a> {
         }
     }
 
+    fn contour_figures(&self, reference: Reference) -> ContourFigures {
+        // A program of rapid traverse alone has no other errors.
+        let is_cutting = self.has_cuts || self.rapids.count == 0;
+        let (contour, within_ends) = match is_cutting {
+            true => (&self.contour, &self.within_ends),
+            false => (&self.rapids, &self.rapids_within_ends),
+        };
+        let rapids = &self.rapids;
+        ContourFigures {
+            reference,
+            max: contour.max(),
+            rms: contour.rms(),
+            max_within_ends: within_ends.max(),
+            rms_within_ends: within_ends.rms(),
+            rapids: (is_cutting && rapids.count > 0)
+                .then(|| RapidFigures { max: rapids.max(), rms: rapids.rms() }),
+        }
+    }
+
     /// Returns true if a rotary axis moves.
     fn has_rotary_motion(&self) -> bool {
         let axes = self.trial.machine.axes().iter();
@@ -279,21 +316,27 @@ impl<'a> Observer<'a> {
     }
 
     /// Adds future setpoints to the polyline before a position cycle, if it is the reference.
-    pub(super) fn push_preview(&mut self, simulation: &Simulation) {
+    ///
+    /// `is_rapid` returns true for instants whose setpoints are reached at rapid traverse.
+    pub(super) fn push_preview(&mut self, simulation: &Simulation, is_rapid: impl Fn(i64) -> bool) {
         let Some(Tracker::Setpoints(tracker)) = &mut self.tracker else { return };
         let horizon = contour_preview_cycles(simulation.period());
         let first = if self.has_preview { horizon } else { 0 };
         self.has_preview = true;
         for periods in first..=horizon {
+            let instant = simulation.next_instant() + i64::from(periods);
             if let Some(rows) = self.programmed {
-                let index = usize::try_from(simulation.next_instant() + i64::from(periods)).unwrap_or(0);
+                let index = usize::try_from(instant).unwrap_or(0);
                 if let Some(row) = rows.chunks_exact(self.preview.len().max(1)).nth(index) {
                     self.preview.copy_from_slice(row);
                 }
             } else {
                 simulation.all_psec_ahead(periods, &mut self.preview);
             }
-            tracker.push(self.kinematics.forward(&self.preview));
+            let (pose, is_rapid) = (self.kinematics.forward(&self.preview), is_rapid(instant));
+            self.has_cuts |= !is_rapid && tracker.moves_to(&pose);
+            self.turn.push(pose, seconds(simulation.time_of(instant)));
+            tracker.push(pose, is_rapid);
         }
     }
 

@@ -97,7 +97,7 @@ fn run_with(
             break;
         }
         let is_moving = simulation.has_active_commands();
-        observer.push_preview(&simulation);
+        observer.push_preview(&simulation, |instant| submitter.is_rapid(instant));
         let time = simulation.time_of(simulation.next_instant());
         if step(&mut simulation).map_err(TrialError::Callback)? {
             let machine = simulation.machine();

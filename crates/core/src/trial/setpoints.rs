@@ -21,6 +21,11 @@ pub trait GridSource {
     /// # Errors
     /// Returns an error if the setpoints cannot be read or are invalid.
     fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError>;
+
+    /// Returns true if the row written last is reached at rapid traverse.
+    fn is_rapid(&self) -> bool {
+        false
+    }
 }
 
 /// Setpoints in memory, row by row.
@@ -28,13 +33,22 @@ pub trait GridSource {
 pub struct GridRows<'a> {
     joints: &'a [usize],
     rows: &'a [f64],
+    /// True for each row that is reached at rapid traverse; further rows are as the last one.
+    rapid: &'a [bool],
+    is_rapid: bool,
 }
 
 impl<'a> GridRows<'a> {
     /// Creates the source of `rows`, m or rad, one value per joint in the order of `joints` (machine indices), row after
     /// row; an incomplete last row is ignored.
     pub fn new(joints: &'a [usize], rows: &'a [f64]) -> Self {
-        GridRows { joints, rows }
+        GridRows { joints, rows, rapid: &[], is_rapid: false }
+    }
+
+    /// Sets for each row whether it is reached at rapid traverse; further rows are as the last one.
+    #[must_use]
+    pub fn with_rapid(self, rapid: &'a [bool]) -> Self {
+        GridRows { rapid, ..self }
     }
 }
 
@@ -47,8 +61,15 @@ impl GridSource for GridRows<'_> {
         let Some((first, rest)) = self.rows.split_at_checked(row.len()) else { return Ok(false) };
         row.copy_from_slice(first);
         self.rows = rest;
+        if let Some((is_rapid, rest)) = self.rapid.split_first() {
+            (self.is_rapid, self.rapid) = (*is_rapid, rest);
+        }
         // A row without joints would never end.
         Ok(!row.is_empty())
+    }
+
+    fn is_rapid(&self) -> bool {
+        self.is_rapid
     }
 }
 

@@ -1,5 +1,6 @@
 //! Submission of setpoints to the simulation as trajectories, shortly before they are due.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use crate::simulation::Simulation;
@@ -17,6 +18,8 @@ const CHUNK: usize = 512;
 /// Position cycles before its start at which a trajectory is submitted: more than the preview of any
 /// controller.
 const LEAD: i64 = 256;
+/// Number of rows that are kept as rapid traverse or feed: those submitted before they are due, and a chunk.
+const KEPT: usize = 2048;
 /// Longest time between arrival and start of a trajectory, ns; a later stamp belongs to another clock.
 const LONGEST_WAIT: Nanoseconds = 86_400 * SECOND_NS;
 
@@ -28,6 +31,10 @@ pub(super) struct TrajectorySubmitter<'a> {
     source: PendingSource<'a>,
     start: Option<Vec<f64>>,
     sent: u64,
+    /// True for each of the last rows that is reached at rapid traverse.
+    rapid: VecDeque<bool>,
+    /// Instant of the first row in `rapid`.
+    first_rapid: i64,
 }
 
 enum PendingSource<'a> {
@@ -54,11 +61,13 @@ impl<'a> TrajectorySubmitter<'a> {
         limits: &[JointLimits],
         trial: &Trial<'_>,
     ) -> Result<Self, TrialError> {
+        let mut rapid = VecDeque::new();
         let (source, start) = match setpoints {
             SetpointSource::Grid(mut source) => {
                 let indices = source.joints().to_vec();
                 let mut row = vec![0.0; indices.len()];
                 let given = source.next(&mut row).map_err(TrialError::Source)?;
+                rapid.push_back(source.is_rapid());
                 let mut start = vec![0.0; limits.len()];
                 for (&index, &value) in indices.iter().zip(&row) {
                     if let Some(joint) = start.get_mut(index) {
@@ -86,7 +95,15 @@ impl<'a> TrajectorySubmitter<'a> {
             source,
             start,
             sent: 0,
+            rapid,
+            first_rapid: 0,
         })
+    }
+
+    /// Returns true if the setpoints at an instant are reached at rapid traverse; those after the last ones as those.
+    pub(super) fn is_rapid(&self, instant: i64) -> bool {
+        let index = usize::try_from(instant - self.first_rapid).unwrap_or(0);
+        self.rapid.get(index).or(self.rapid.back()).is_some_and(|is_rapid| *is_rapid)
     }
 
     /// Returns the setpoints at time 0, m or rad per joint, or `None` if the first ones are later.
@@ -113,7 +130,13 @@ impl<'a> TrajectorySubmitter<'a> {
                         return Ok(());
                     }
                     let first = *next;
-                    let request = chunk(source.as_mut(), names, next, row, self.period)?;
+                    let rapid = &mut self.rapid;
+                    let request = chunk(source.as_mut(), names, next, row, self.period, |is_rapid| {
+                        rapid.push_back(is_rapid);
+                    })?;
+                    let passed = rapid.len().saturating_sub(KEPT);
+                    rapid.drain(..passed);
+                    self.first_rapid += passed as i64;
                     (first * self.period, request)
                 }
                 PendingSource::Requests { requests, pending, origin } => {
@@ -151,13 +174,15 @@ impl<'a> TrajectorySubmitter<'a> {
     }
 }
 
-/// Returns the next rows of a grid as a trajectory that starts at the instant of the first row.
+/// Returns the next rows of a grid as a trajectory that starts at the instant of the first row. `on_row` receives true for
+/// each row read that is reached at rapid traverse.
 fn chunk(
     source: &mut dyn GridSource,
     names: &[String],
     next: &mut i64,
     row: &mut Option<Vec<f64>>,
     period: Nanoseconds,
+    mut on_row: impl FnMut(bool),
 ) -> Result<TrajectoryRequest, TrialError> {
     let first = *next;
     let mut request = TrajectoryRequest::new(Start::At(first * period), names.to_vec());
@@ -172,6 +197,8 @@ fn chunk(
         *next += 1;
         if !source.next(positions).map_err(TrialError::Source)? {
             *row = None;
+        } else {
+            on_row(source.is_rapid());
         }
     }
     Ok(request)

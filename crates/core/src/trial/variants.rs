@@ -91,7 +91,7 @@ pub fn run_variants(
         }
         let is_moving = base.has_active_commands();
         for observer in &mut observers {
-            observer.push_preview(&base);
+            observer.push_preview(&base, |instant| submitter.is_rapid(instant));
         }
         batch.update_preview(&base);
         let time = base.time_of(base.next_instant());

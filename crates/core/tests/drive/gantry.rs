@@ -85,7 +85,7 @@ fn without_a_beam_the_other_axis_gets_nothing() {
 
 /// Returns the default machine whose Y is like X, with changes.
 fn equal_axes(changes: &[&str]) -> MachineConfig {
-    let mut parameters = Parameters::builtin("mikron_ucp710").expect("shipped");
+    let mut parameters = Parameters::load("mikron_ucp710", virtual_axes_builtin::MACHINES).expect("shipped");
     let source = ValueSource::named("test");
     let of_y = Vec::from_iter(parameters.definitions().filter_map(|(key, _)| {
         let suffix = key.strip_prefix("x.")?;

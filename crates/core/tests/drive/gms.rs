@@ -106,7 +106,7 @@ fn the_curve_of_an_axis_after_a_reversal_has_points_of_that_of_the_bristles() {
         let config = machine(&["x.friction.presliding_stiffness_n_um=50", &elements]);
         let axis = &config.axes()[X];
         let plant = Plant::new(axis, 1e-4).expect("can be discretized");
-        let own = MaxwellSlip::of_axis(axis, &plant, 1e-4).expect("elements");
+        let own = MaxwellSlip::of_axis(axis, plant.angle_per_torque(), 1e-4).expect("elements");
         let mut moved = MovedElements::of(own.elements(), LAW);
         // g/σ0.
         let length = LAW / axis.presliding.expect("presliding").stiffness;
@@ -271,7 +271,7 @@ proptest! {
         let config = machine(&changes.iter().map(String::as_str).collect::<Vec<_>>());
         let axis = &config.axes()[X];
         let plant = Plant::new(axis, 125e-6).expect("can be discretized");
-        let model = MaxwellSlip::of_axis(axis, &plant, 125e-6).expect("elements");
+        let model = MaxwellSlip::of_axis(axis, plant.angle_per_torque(), 125e-6).expect("elements");
         let own = if is_elastic { inertia - load_inertia } else { inertia };
         let energy = |motor: &MotorState, load: &LoadState, state: &MaxwellSlipState| {
             let spring = axis.transmission.map_or(0.0, |t| t.stiffness * load.wind_up.powi(2) / 2.0);

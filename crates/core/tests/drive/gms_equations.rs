@@ -1,4 +1,4 @@
-//! Friction by elements against an independent solution of the equations of its authors (`tools/golden_gms.py`).
+//! Friction by elements against an independent solution of the equations of its authors (`tools/golden_friction.py`).
 
 use std::f64::consts::TAU;
 
@@ -8,7 +8,7 @@ use crate::gms::PER_FORCE;
 use crate::parameter_ranges::golden;
 use crate::presliding::published_axis;
 
-/// Elements of `tools/golden_gms.py`.
+/// Elements of `tools/golden_friction.py`.
 const ELEMENTS: [MaxwellSlipElement; 4] = [
     MaxwellSlipElement { stiffness: 5e4, share: 0.2 },
     MaxwellSlipElement { stiffness: 2.5e4, share: 0.25 },

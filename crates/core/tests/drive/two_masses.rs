@@ -1,6 +1,6 @@
 //! Elastic transmission against two masses with a spring and a damper in MuJoCo.
 //!
-//! `tools/golden_two_masses.py` computes the reference data.
+//! `tools/golden_bodies.py` computes the reference data.
 
 use virtual_axes_core::config::{MotorConfig, TransmissionConfig};
 use virtual_axes_core::drive::{LoadState, Motor, MotorState, Transmission};

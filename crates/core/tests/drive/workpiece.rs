@@ -1,11 +1,11 @@
 //! Workpiece on the tables of A and C: torques and motion against MuJoCo, energy, and machines with friction and control.
 //!
-//! `tools/golden_coupling.py` computes the reference data.
+//! `tools/golden_bodies.py` computes the reference data.
 
 use std::sync::Arc;
 
 use nalgebra::{Matrix2, Rotation3, Vector2, Vector3};
-use virtual_axes_core::config::{KinematicsConfig, MachineConfig, WorkpieceConfig};
+use virtual_axes_core::config::{KinematicsConfig, MachineConfig, RotaryChain, WorkpieceConfig};
 use virtual_axes_core::drive::{Plant, STANDARD_GRAVITY, WorkpieceDynamics};
 use virtual_axes_core::machine::{Machine, MachineParameters, SimdWidth};
 use virtual_axes_core::trial::{Measures, Trial, run, run_variants};
@@ -47,6 +47,8 @@ fn inertia_gravity_and_velocity_torques_are_those_of_mujoco() {
     let (mut worst, mut count) = (0.0_f64, 0);
     for row in golden("workpieces.csv") {
         let kinematics = KinematicsConfig {
+            chain: RotaryChain::default(),
+            pivot_b: [0.0; 2],
             tool_length: 0.2,
             pivot_a: [row[0], row[1]],
             pivot_c: [row[2], row[3]],

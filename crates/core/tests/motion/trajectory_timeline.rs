@@ -1,10 +1,11 @@
 //! Timeline: start instants, junctions of trajectories, preemption, stops, reset.
 
 use crate::trajectory_common::*;
+use std::f64::consts::TAU;
 use std::sync::Arc;
 use virtual_axes_core::trajectory::timeline::MAX_WAITING;
 use virtual_axes_core::trajectory::{
-    KinematicState, MotionId, RejectionCode, Start, TimelineEvent, TrajectoryRequest,
+    KinematicState, MotionId, RejectionCode, Start, Timeline, TimelineEvent, TrajectoryRequest,
 };
 
 const A: MotionId = MotionId(1);
@@ -109,6 +110,48 @@ fn a_jump_is_measured_from_the_setpoint_commanded_at_the_start() {
     assert_eq!(submit(&mut t, 4, &from(0.0)).unwrap_err().code, RejectionCode::Jump);
     let (psec, _) = run(&mut t, 0, 51);
     assert_eq!(psec[50], 0.052, "rejected trajectories change nothing");
+}
+
+#[test]
+fn a_trajectory_on_a_continuous_joint_begins_at_the_nearest_turn() {
+    let mut t = Timeline::new(joints(), TSP, &[0.0, 7.0]).unwrap();
+    for turns in [-3.0, 0.0, 1.0, 12.0] {
+        let begin = 7.0 + turns * TAU;
+        let points: &[(i64, &[f64])] = &[(0, &[begin, 0.0]), (10, &[begin + 0.01, 0.0]), (20, &[begin, 0.0])];
+        submit(&mut t, 1, &path(Start::Now, "c", points)).unwrap();
+        let (psec, _) = run(&mut t, 1, 30);
+        for (k, expected) in [(0, 7.0), (10, 7.01), (20, 7.0), (29, 7.0)] {
+            assert!((psec[k] - expected).abs() < 1e-12, "{turns}: {} at {k}", psec[k]);
+        }
+    }
+    // A later first point is an absolute angle, and a start between two turns is a jump.
+    submit(&mut t, 1, &path(Start::Now, "c", &[(5000, &[7.0 - TAU, 0.0])])).unwrap();
+    assert_eq!(run(&mut t, 1, 5001).0.last(), Some(&(7.0 - TAU)));
+    let rejection = submit(&mut t, 2, &path(Start::Now, "c", &[(0, &[4.0]), (5, &[4.0])])).unwrap_err();
+    assert_eq!(rejection.code, RejectionCode::Jump);
+    assert!((rejection.value - (4.0 - (7.0 - TAU) - TAU).abs()).abs() < 1e-12);
+}
+
+#[test]
+fn a_stamp_of_another_clock_is_rejected_with_the_remedy() {
+    const HOUR_K: i64 = 3_600_000_000_000 / TSP;
+    let mut t = timeline();
+    run(&mut t, 0, 3);
+    let starting = |k: i64| path(at(k), "x", &[(0, &[0.0]), (2, &[0.0])]);
+    assert!(submit(&mut t, 1, &starting(99 * HOUR_K)).is_ok());
+    for (k, code) in
+        [(101 * HOUR_K, RejectionCode::InvalidTime), (-101 * HOUR_K, RejectionCode::EndedInThePast)]
+    {
+        let rejection = submit(&mut t, 2, &starting(k)).unwrap_err();
+        assert_eq!(rejection.code, code);
+        assert!(
+            rejection.text.contains("set use_sim_time of both nodes, or of neither"),
+            "{}",
+            rejection.text
+        );
+    }
+    let rejection = submit(&mut t, 2, &starting(-HOUR_K)).unwrap_err();
+    assert!(!rejection.text.contains("use_sim_time"), "{}", rejection.text);
 }
 
 #[test]

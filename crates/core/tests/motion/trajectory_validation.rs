@@ -124,6 +124,13 @@ fn the_last_step_to_a_point_between_two_periods_is_checked() {
 }
 
 #[test]
+fn a_residual_velocity_at_the_end_counts_as_zero() {
+    let of = |velocity: f64| request(Start::Now, "x", &[(0, &[0.0, 0.0]), (TSP * 10, &[0.003, velocity])]);
+    assert!(validate(of(4e-7), false).is_ok() && validate(of(-1e-6), false).is_ok());
+    assert_eq!(rejection_of(of(1.1e-6)).0, RejectionCode::VelocityAtEnd);
+}
+
+#[test]
 fn velocity_at_the_end_requires_the_parameter() {
     let points: &[(i64, &[f64])] = &[(0, &[0.0, 0.1]), (TSP * 10, &[0.006, 0.1])];
     assert_eq!(

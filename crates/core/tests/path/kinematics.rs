@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 use proptest::prelude::*;
-use virtual_axes_core::config::{KinematicsConfig, Parameters, ValueSource};
+use virtual_axes_core::config::{KinematicsConfig, Parameters, RotaryChain, RotaryName, ValueSource};
 use virtual_axes_core::kinematics::{AxisRole, Kinematics, KinematicsError, ToolPose};
 use virtual_axes_verification::fixtures::machines::parameters;
 
@@ -17,14 +17,16 @@ const TOOL: f64 = 0.1;
 /// Geometry with distinct nonzero values, m.
 const GEOMETRY: KinematicsConfig = KinematicsConfig {
     tool_length: 0.137,
+    chain: RotaryChain { axes: [Some(RotaryName::C), Some(RotaryName::A)], tables: 2 },
     pivot_a: [0.021, -0.093],
+    pivot_b: [0.047, 0.065],
     pivot_c: [-0.013, 0.034],
     workpiece: [0.055, -0.071, 0.112],
 };
 
 /// Returns the kinematics of the default machine with `geometry`.
 fn with(geometry: &KinematicsConfig) -> Kinematics {
-    let KinematicsConfig { tool_length, pivot_a, pivot_c, workpiece } = *geometry;
+    let KinematicsConfig { tool_length, pivot_a, pivot_c, workpiece, .. } = *geometry;
     let values = [
         ("tool_length", tool_length),
         ("pivot_a_y", pivot_a[0]),
@@ -77,7 +79,7 @@ fn solve(kinematics: &Kinematics, pose: &ToolPose, near: &[f64]) -> Result<Vec<f
 
 /// Returns the pose by homogeneous matrices: the chain from the workpiece to the machine, inverted.
 fn pose_by_matrices(geometry: &KinematicsConfig, joints: &[f64]) -> ToolPose {
-    let KinematicsConfig { tool_length, pivot_a, pivot_c, workpiece } = *geometry;
+    let KinematicsConfig { tool_length, pivot_a, pivot_c, workpiece, .. } = *geometry;
     let turn = |axis: Vector3<f64>, angle: f64, about: Vector3<f64>| {
         Matrix4::new_translation(&about)
             * Matrix4::from_axis_angle(&nalgebra::Unit::new_normalize(axis), angle)

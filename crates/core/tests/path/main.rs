@@ -2,6 +2,7 @@
 
 mod circularity;
 mod closed_form;
+mod kinematic_chains;
 mod kinematics;
 mod path_blocks;
 mod path_common;
@@ -9,5 +10,4 @@ mod path_program;
 mod path_tracker;
 mod reference_numbers;
 mod scenario_properties;
-mod scenarios;
 mod setpoint_tracker;

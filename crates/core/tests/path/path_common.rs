@@ -1,8 +1,9 @@
 //! Fixtures of path tests: default machine, moves, and differences of setpoints over the position cycle.
 
+use nalgebra::Vector3;
 use virtual_axes_core::config::{AxisKind, Parameters};
 use virtual_axes_core::kinematics::Kinematics;
-use virtual_axes_core::path::{Block, Frame, Move, PlanError, Program};
+use virtual_axes_core::path::{Block, Frame, Move, Path, PlanError, Program};
 use virtual_axes_core::trajectory::JointLimits;
 
 /// Position cycle of the default machine, ns.
@@ -82,4 +83,25 @@ pub fn assert_within_limits(program: &Program) {
             assert!(*used <= 1.0 + 1.1e-6, "joint {joint}, difference {}: {used} of its limit", order + 1);
         }
     }
+}
+
+/// Returns the smallest distance of the tip from the path between two values of progress, by sampling and interval
+/// reduction around each sample that is nearer than its neighbors.
+pub fn brute_force(path: &Path, from: f64, to: f64, tip: &Vector3<f64>) -> f64 {
+    let at = |u: f64| (path.tool(u).tip - tip).norm();
+    let count = 2000;
+    let progress = |i: usize| from + (to - from) * i as f64 / count as f64;
+    let samples: Vec<f64> = (0..=count).map(|i| at(progress(i))).collect();
+    let refined = |i: usize| {
+        let (mut low, mut high) = (progress(i.saturating_sub(1)), progress((i + 1).min(count)));
+        for _ in 0..90 {
+            let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+            if at(a) < at(b) { high = b } else { low = a }
+        }
+        at(low).min(at(high))
+    };
+    let is_least =
+        |i: &usize| samples[*i] <= samples[i.saturating_sub(1)] && samples[*i] <= samples[(i + 1).min(count)];
+    let least = (0..=count).filter(is_least).map(refined).fold(f64::INFINITY, f64::min);
+    least.min(at(from)).min(at(to))
 }

@@ -7,7 +7,7 @@ use crate::path_common::*;
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use virtual_axes_core::assess::{NearestPoint, PathDeviations, PathTracker};
-use virtual_axes_core::kinematics::{Poses, TableAngles, ToolPose};
+use virtual_axes_core::kinematics::{Poses, RotaryAngles, ToolPose};
 use virtual_axes_core::path::{Block, Frame, Path};
 use virtual_axes_core::units::DEGREE;
 
@@ -20,21 +20,6 @@ fn path(frame: Frame, blocks: Vec<Block>) -> Arc<Path> {
 fn spline(from: [f64; 5], points: &[[f64; 5]]) -> Block {
     let points: Vec<Vec<f64>> = points.iter().map(|point| point.to_vec()).collect();
     Block::spline(&from, &points, &KINDS).expect("a spline")
-}
-
-/// Returns the smallest distance of the tip from the path between two values of progress, by sampling and
-/// interval reduction around the best sample.
-fn brute_force(path: &Path, from: f64, to: f64, tip: &Vector3<f64>) -> f64 {
-    let at = |u: f64| (path.tool(u).tip - tip).norm();
-    let count = 2000;
-    let progress = |i: i32| from + (to - from) * f64::from(i.clamp(0, count)) / f64::from(count);
-    let best = (0..=count).min_by(|a, b| at(progress(*a)).total_cmp(&at(progress(*b)))).expect("samples");
-    let (mut low, mut high) = (progress(best - 1), progress(best + 1));
-    for _ in 0..90 {
-        let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-        if at(a) < at(b) { high = b } else { low = a }
-    }
-    at(low).min(at(high)).min(at(from)).min(at(to))
 }
 
 #[test]
@@ -304,14 +289,14 @@ fn nan_and_huge_inputs_are_tolerated() {
 }
 
 /// Follows a path of five axes cycle by cycle; `progress_of` returns the progress of the tip at a time, position
-/// cycles. Compares each tick with the search for single poses, and some with brute force.
+/// cycles. Compares each tick with the search for one pose, and some with brute force.
 fn follow_cycles(path: &Arc<Path>, cycles: usize, error: f64, progress_of: impl Fn(f64) -> f64) {
     const TICKS: usize = 48;
     let kinematics = kinematics(&[]);
     let mut tracker = PathTracker::new(Arc::clone(path));
     let mut single = tracker.clone();
     let (mut angles, mut poses, mut found) =
-        (TableAngles::default(), Poses::default(), PathDeviations::default());
+        (RotaryAngles::default(), Poses::default(), PathDeviations::default());
     let mut joints = vec![0.0; 5];
     let mut furthest = 0.0_f64;
     for cycle in 0..cycles {

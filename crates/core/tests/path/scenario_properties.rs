@@ -48,7 +48,7 @@ proptest! {
             prop::sample::select(vec!["1e300", "1e-300", "-0.0", ".nan", ".inf", "turns: 1e9", "ramp_s: 0.1", "dwell_s: 1", "corner_m_min: 1"]).prop_map(str::to_owned),
         ],
     ) {
-        let mut bytes = Scenario::builtin_text(name).expect("built-in").as_bytes().to_vec();
+        let mut bytes = Scenario::builtin_text(name, virtual_axes_builtin::SCENARIOS).expect("built-in").as_bytes().to_vec();
         let at = position.index(bytes.len());
         bytes.splice(at..(at + length).min(bytes.len()), patch.into_bytes());
         let text = String::from_utf8_lossy(&bytes);

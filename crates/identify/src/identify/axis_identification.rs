@@ -6,18 +6,16 @@ use std::io;
 use thiserror::Error;
 use virtual_axes_core::config::{AxisConfig, ConfigError, ParameterKind, Parameters, Periods};
 use virtual_axes_core::machine::MachineError;
-use virtual_axes_core::units::{MILLISECOND, MILLISECOND_NS};
+use virtual_axes_core::units::MILLISECOND_NS;
 
+use super::recorded_feedforward::recorded_feedforward;
 use super::summary::IdentificationSummary;
+use super::validate::validate_with;
 use super::{
     Agreement, FeedforwardMode, Identification, IdentificationInput, IdentificationOptions, IdentifiedValue,
-    are_production_traces, constant_lag, identify_with_transmission, invalid_agreement, update_parameters,
-    validate,
+    identify_with_transmission, invalid_agreement, update_parameters,
 };
 use crate::recording::{Conditioning, ConditioningError, Finding, RawRecording, Signals, condition};
-
-/// Lag of the position, relative to 1 / Kp, below which velocity feedforward must be active.
-const SHORT: f64 = 0.7;
 
 /// Error of the identification of an axis.
 #[derive(Debug, Error)]
@@ -25,23 +23,6 @@ pub enum AxisIdentificationError {
     /// Recording that is not plausible for the axis.
     #[error(transparent)]
     Conditioning(#[from] ConditioningError),
-    /// Recording without feedforward signals whose active feedforward is unknown.
-    #[error(
-        "{name}: has no {missing}, and the lag of the position ({lag_ms:.1} ms) does not tell whether feedforward was active: \
-         without it the lag is at least 1 / Kp, {without_ms:.1} ms; give {option} off, velocity or both"
-    )]
-    UnknownFeedforward {
-        /// Name of the recording.
-        name: String,
-        /// Missing signal.
-        missing: &'static str,
-        /// Lag of the position, ms; NaN if it is unknown.
-        lag_ms: f64,
-        /// Lag without feedforward, ms.
-        without_ms: f64,
-        /// Option that names the active feedforward.
-        option: String,
-    },
     /// Recordings that determine no parameter.
     #[error("no parameter of {axis} could be identified{findings}")]
     NoResult {
@@ -73,49 +54,19 @@ pub struct ConditionedRecording {
 }
 
 impl ConditionedRecording {
-    /// Conditions the recording `raw` of `axis`, which was read with `findings`. `feedforward` is the value of `option`,
-    /// which errors name.
+    /// Conditions the recording `raw` of `axis`, which was read with `findings`; `feedforward` is the active feedforward if
+    /// it was given.
     ///
     /// # Errors
-    /// [`AxisIdentificationError`] if the recording is not plausible, or if its active feedforward is unknown.
+    /// [`AxisIdentificationError`] if the recording is not plausible.
     pub fn new(
         (raw, mut findings): (&RawRecording, Vec<Finding>),
         (axis, periods): (&AxisConfig, &Periods),
         conditioning: &Conditioning,
-        (mut feedforward, option): (Option<FeedforwardMode>, &str),
+        feedforward: Option<FeedforwardMode>,
     ) -> Result<Self, AxisIdentificationError> {
         let (signals, more) = condition(raw, axis, periods, conditioning)?;
         findings.extend(more);
-        let input = IdentificationInput { signals: &signals, feedforward };
-        let is_inferred = are_production_traces(&[input], axis, periods);
-        if let (None, Some(missing), false) = (feedforward, missing_feedforward(&signals), is_inferred) {
-            let lag = constant_lag(&signals).map(|(lag, _)| lag);
-            let without = 1.0 / axis.position_loop.gain;
-            let (lag_ms, without_ms) = (lag.unwrap_or(f64::NAN) / MILLISECOND, without / MILLISECOND);
-            if !lag.is_some_and(|lag| lag < SHORT * without) {
-                let (name, option) = (signals.name.clone(), option.to_owned());
-                return Err(AxisIdentificationError::UnknownFeedforward {
-                    name,
-                    missing,
-                    lag_ms,
-                    without_ms,
-                    option,
-                });
-            }
-            let mode = if axis.feedforward.torque != 0.0 {
-                FeedforwardMode::Both
-            } else {
-                FeedforwardMode::Velocity
-            };
-            feedforward = Some(mode);
-            let what = format!(
-                "{}: feedforward {} is assumed: the position lags by {lag_ms:.1} ms, without feedforward it would by at least \
-                 1 / Kp, {without_ms:.1} ms",
-                signals.name,
-                mode.name(),
-            );
-            findings.push(Finding::note("feedforward-inferred", what));
-        }
         Ok(ConditionedRecording { signals, feedforward, findings })
     }
 
@@ -144,18 +95,6 @@ impl ConditionedRecording {
     }
 }
 
-/// Returns the name of the feedforward signal that is missing to determine the active feedforward.
-fn missing_feedforward(signals: &Signals) -> Option<&'static str> {
-    let is_active = |channel: &[f64]| channel.iter().any(|value| *value != 0.0);
-    signals.spans.iter().filter(|span| span.psec.is_some()).find_map(|span| {
-        match (&span.velocity_feedforward, &span.torque_feedforward) {
-            (None, _) => Some("velocity feedforward (VFFWS)"),
-            (Some(velocity), None) if is_active(velocity) => Some("torque feedforward (TFFWS)"),
-            _ => None,
-        }
-    })
-}
-
 /// Comparison of the identified axis with a validation recording.
 #[derive(Debug)]
 pub struct AxisValidation {
@@ -166,20 +105,19 @@ pub struct AxisValidation {
 }
 
 impl AxisValidation {
-    /// Compares the identified axis with the recording. Unknown feedforward of a production trace is the one with the
-    /// smaller residual.
+    /// Compares the identified axis with the recording. An unknown feedforward is the one with the
+    /// smaller residual; `joint` is the share of the ripple of the position cycle in the current after a joint fit.
     fn new(
         mut recorded: ConditionedRecording,
         axis: &AxisConfig,
         periods: &Periods,
+        joint: Option<f64>,
     ) -> Result<Self, AxisIdentificationError> {
-        let is_unknown =
-            recorded.feedforward.is_none() && are_production_traces(&[recorded.input()], axis, periods);
-        if is_unknown {
+        if recorded.feedforward.is_none() {
             let mut best: Option<(f64, FeedforwardMode)> = None;
             for mode in FeedforwardMode::ALL {
                 recorded.feedforward = Some(mode);
-                let baseline = validate(&recorded.input(), axis, periods)?.baseline;
+                let baseline = validate_with(&recorded.input(), (axis, periods), joint)?.baseline;
                 let residual = baseline.map_or(f64::INFINITY, |baseline| baseline.model);
                 if best.is_none_or(|(least, _)| residual < least) {
                     best = Some((residual, mode));
@@ -193,7 +131,7 @@ impl AxisValidation {
             );
             recorded.findings.push(Finding::note("feedforward-inferred", what));
         }
-        let agreement = validate(&recorded.input(), axis, periods)?;
+        let agreement = validate_with(&recorded.input(), (axis, periods), joint)?;
         Ok(AxisValidation { recorded, agreement })
     }
 }
@@ -268,7 +206,7 @@ impl AxisIdentification {
         let updated = update_parameters(&mut identified, axis.name(), &values);
         if let Err(error) = updated.and_then(|()| identified.machine_config().map(drop)) {
             // The values are shown, with the reason why they cannot be used.
-            let remedy = "check the recordings and the machine file";
+            let remedy = "check the recordings and the initial machine";
             findings.insert(0, Finding::invalid("rejected", error.to_string(), remedy));
             identified = parameters.clone();
         }
@@ -276,9 +214,14 @@ impl AxisIdentification {
         let updated = identified.machine_config()?;
 
         start(&format!("validating {}", axis.name()))?;
+        let joint = identification.periods.map(|_| identification.ripple());
         let validations = others.into_iter().map(|mut recorded| {
-            recorded.feedforward = recorded.feedforward.or(identification.inferred_feedforward);
-            AxisValidation::new(recorded, &updated.axes()[index], &updated.periods())
+            // Recordings of one machine usually have the same feedforward.
+            let known = identification.active_feedforward.first().copied();
+            let is_common = identification.active_feedforward.iter().all(|mode| Some(*mode) == known);
+            let own = recorded_feedforward(&recorded.signals);
+            recorded.feedforward = recorded.feedforward.or(own).or(known.filter(|_| is_common));
+            AxisValidation::new(recorded, &updated.axes()[index], &updated.periods(), joint)
         });
         let validations: Vec<AxisValidation> = validations.collect::<Result<_, AxisIdentificationError>>()?;
         for AxisValidation { recorded, agreement } in &validations {

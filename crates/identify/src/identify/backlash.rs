@@ -1,6 +1,6 @@
 //! Backlash that the model does not have, from the position residual in both directions.
 
-use super::closed_loop::{Experiment, SimulatedExperiment};
+use super::experiment::{Experiment, SimulatedExperiment};
 use super::validate::Agreement;
 use virtual_axes_core::units::MILLIMETER;
 

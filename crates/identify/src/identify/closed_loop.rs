@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
+use super::experiment::{Experiment, SimulatedExperiment};
 use super::feedforward_mode::FeedforwardMode;
 use super::low_pass::LowPassFilter;
 use super::setpoints::{SetpointGrid, stride};
@@ -24,63 +25,6 @@ const RESTING_ANGLE: f64 = 5e-3 * DEGREE;
 const STILL: f64 = 1e-7;
 const STILL_ANGLE: f64 = 1e-4 * DEGREE;
 
-/// Section of a recording that starts at rest and can be simulated.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Experiment {
-    /// Index of the recording.
-    pub recording: usize,
-    /// Index of the span in [`Signals::spans`].
-    pub span: usize,
-    /// Index of the first sample of the experiment in the span.
-    pub sample: usize,
-    /// Active feedforward.
-    pub mode: FeedforwardMode,
-    /// PSEC from the first position cycle on, m or rad.
-    pub(super) psec: Vec<f64>,
-    /// Time of the first sample after the first position cycle, s.
-    pub(super) first: f64,
-    pub(super) period: f64,
-    /// Half-power frequency, Hz, of the low-pass filter of the control.
-    pub(super) trace_filter: Option<f64>,
-    /// Time of the first sample in the recording, s.
-    pub start: f64,
-    /// Recorded position, m or rad.
-    pub position: Vec<f64>,
-    /// Recorded velocity, or the derivative of the filtered position, m/s or rad/s.
-    pub velocity: Vec<f64>,
-    /// Recorded current, A.
-    pub current: Option<Vec<f64>>,
-}
-
-/// Simulated signals at the samples of an experiment.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct SimulatedExperiment {
-    /// Simulated position, m or rad.
-    pub position: Vec<f64>,
-    /// Simulated velocity, m/s or rad/s.
-    pub velocity: Vec<f64>,
-    /// Simulated motor current, A.
-    pub current: Vec<f64>,
-}
-
-impl Experiment {
-    /// Returns the sampling period, s.
-    pub fn period(&self) -> f64 {
-        self.period
-    }
-
-    /// Returns true if PSEC changes.
-    pub fn moves(&self) -> bool {
-        self.psec.windows(2).any(|pair| pair[0] != pair[1])
-    }
-
-    /// Returns PSEC at sample `i` with zero-order hold, m or rad; `tsp` is the position cycle, s.
-    pub fn psec_at(&self, i: usize, tsp: f64) -> f64 {
-        let instant = ((self.first + i as f64 * self.period) / tsp + 1e-9).floor().max(0.0) as usize;
-        self.psec.get(instant.min(self.psec.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)
-    }
-}
-
 /// Splits a recording into experiments that start at rest and have one feedforward mode; empty without PSEC.
 ///
 /// `mode` is the active feedforward if the recording does not contain VFFWS and TFFWS.
@@ -93,7 +37,9 @@ pub fn find_experiments(
 ) -> Vec<Experiment> {
     let tsp = seconds(periods.position);
     if stride(signals.period, tsp).is_none() {
-        return trace_experiments(signals, recording, periods, mode, 0.0);
+        // A current recorded more coarsely than the position cycle counts as its mean.
+        let ripple = if signals.period > tsp { 0.0 } else { 1.0 };
+        return trace_experiments(signals, recording, periods, (mode, 0.0, ripple));
     }
     let mut found = Vec::new();
     let (resting, still) = match axis.kind() {
@@ -124,10 +70,12 @@ pub fn find_experiments(
                 span: number,
                 sample,
                 mode,
+                cycle: tsp,
                 psec: setpoints.values[begin..end].to_vec(),
                 first: sample as f64 * signals.period - time,
                 period: signals.period,
                 trace_filter: signals.trace_filter,
+                ripple: 1.0,
                 start: span.start + sample as f64 * signals.period,
                 position: of(&span.position),
                 velocity: of(span.recorded_velocity.as_ref().unwrap_or(&span.velocity)),
@@ -236,14 +184,13 @@ pub fn simulate(
     let time_of = |i: usize| (experiment.first + i as f64 * experiment.period) / tick;
     let mut due = time_of(0);
     let mut now = 0_u64;
-    // A current recorded more coarsely than the position cycle is a mean; that of an instant has the ripple of the cycle.
-    let is_mean = experiment.period > seconds(periods.position);
+    let has_mean = experiment.ripple != 1.0;
     let mut sums = vec![0.0];
     let mut filters = experiment
         .trace_filter
         .map(|cutoff| [*first, 0.0, 0.0].map(|start| LowPassFilter::new(cutoff, tick, start)));
     // Without a filter or a mean, only the ticks on either side of a sample are read.
-    let needs_all = is_mean || filters.is_some();
+    let needs_all = has_mean || filters.is_some();
     let ticks = machine.ticks_per_period();
     for psec in &experiment.psec {
         machine.advance(&[*psec], &[]);
@@ -271,7 +218,7 @@ pub fn simulate(
                 next += 1;
                 due = time_of(next);
             }
-            if is_mean {
+            if has_mean {
                 sums.push(sums.last().copied().unwrap_or(0.0) + here[2]);
             }
             before = here;
@@ -281,13 +228,14 @@ pub fn simulate(
             before = machine.motion_at(0, ticks - 1);
         }
     }
-    if is_mean {
+    if has_mean {
         let half = 0.5 * seconds(periods.position) / tick;
         for (i, current) in simulated.current.iter_mut().enumerate() {
             let (from, to) = ((time_of(i) - half).max(0.0) as usize, (time_of(i) + half) as usize);
             let to = to.min(sums.len() - 1);
             if to > from {
-                *current = (sums[to] - sums[from]) / (to - from) as f64;
+                let mean = (sums[to] - sums[from]) / (to - from) as f64;
+                *current = mean + experiment.ripple * (*current - mean);
             }
         }
     }

@@ -5,46 +5,50 @@ use rayon::prelude::*;
 
 use super::fit::{BoundedParameter, RANK, pseudo_inverse};
 
-/// Returns the covariance of fitted values from the sums of the residuals over clusters, which are independent although
-/// the residuals within a cluster are not (sandwich estimator). Rows without cluster, such as priors, have no noise.
-pub(super) fn clustered_covariance(
+/// Fewest clusters per value that show the variance of their sums.
+const CLUSTERS: usize = 3;
+
+/// Returns the posterior covariance of fitted values. The first rows of the residuals, one per element of `clusters`, are
+/// data with the standard deviation `noise` of an independent row; the others are priors of that deviation.
+///
+/// With many clusters, which are independent although the residuals within a cluster are not, the sums of the residuals
+/// over the clusters replace the noise where they are larger (sandwich estimator).
+pub(super) fn posterior_covariance(
     parameters: &[BoundedParameter],
     values: &[f64],
     residuals: impl Fn(&[f64]) -> Option<DVector<f64>> + Sync,
     clusters: &[Option<usize>],
+    noise: f64,
 ) -> Option<DMatrix<f64>> {
-    let here = residuals(values)?;
-    let (jacobian, scale) = scaled_jacobian(parameters, values, &residuals)?;
-    let bread = pseudo_inverse(jacobian.transpose() * &jacobian, RANK)?;
-    let count = clusters.iter().flatten().max().map_or(0, |last| last + 1);
-    let mut scores = vec![DVector::zeros(values.len()); count];
-    for (row, cluster) in clusters.iter().enumerate().take(here.len()) {
+    let here = residuals(values)? / noise;
+    let (jacobian, scale) =
+        scaled_jacobian(parameters, values, &|x: &[f64]| residuals(x).map(|left| left / noise))?;
+    // Columns of norm 1 make a prior comparable with the data.
+    let posterior = pseudo_inverse(jacobian.transpose() * &jacobian, RANK)?;
+    let priors = jacobian.rows(clusters.len(), jacobian.nrows() - clusters.len());
+    let mut scores =
+        vec![DVector::zeros(values.len()); clusters.iter().flatten().max().map_or(0, |last| last + 1)];
+    for (row, cluster) in clusters.iter().enumerate() {
         if let Some(score) = cluster.and_then(|cluster| scores.get_mut(cluster)) {
             *score += jacobian.row(row).transpose() * here[row];
         }
     }
     let used: Vec<&DVector<f64>> = scores.iter().filter(|score| score.norm() > 0.0).collect();
+    if used.len() < CLUSTERS * values.len() {
+        return Some(unscaled(posterior, &scale));
+    }
     let mut meat = DMatrix::zeros(values.len(), values.len());
     for score in &used {
         meat += *score * score.transpose();
     }
     // Few clusters underestimate the variance.
-    let freedom = used.len().saturating_sub(values.len()).max(1);
-    let covariance = &bread * meat * &bread * (used.len() as f64 / freedom as f64);
-    Some(unscaled(covariance, &scale))
-}
-
-/// Returns the covariance of fitted values if the residuals are no noise but an error of the model, which may act in the
-/// direction of any one parameter: (JᵀJ)⁻¹ |r|², an upper bound.
-pub(super) fn systematic_covariance(
-    parameters: &[BoundedParameter],
-    values: &[f64],
-    residuals: impl Fn(&[f64]) -> Option<DVector<f64>> + Sync,
-) -> Option<DMatrix<f64>> {
-    let squares = residuals(values)?.norm_squared();
-    let (jacobian, scale) = scaled_jacobian(parameters, values, &residuals)?;
-    let inverse = pseudo_inverse(jacobian.transpose() * &jacobian, RANK)?;
-    Some(unscaled(inverse * squares, &scale))
+    meat *= used.len() as f64 / (used.len() - values.len()) as f64;
+    let sandwich = &posterior * (meat + priors.transpose() * priors) * &posterior;
+    let grown = DMatrix::from_fn(values.len(), values.len(), |j, k| {
+        let growth = |k: usize| (sandwich[(k, k)] / posterior[(k, k)]).max(1.0).sqrt();
+        posterior[(j, k)] * growth(j) * growth(k)
+    });
+    Some(unscaled(grown, &scale))
 }
 
 /// Returns the Jacobian with columns of norm 1, and their norms; parameters without effect have the norm 0.

@@ -8,7 +8,8 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::closed_loop::{Experiment, position_residuals};
+use super::closed_loop::position_residuals;
+use super::experiment::Experiment;
 use super::feedforward_mode::FeedforwardMode;
 use virtual_axes_core::config::{AxisConfig, DelaysConfig, Periods};
 use virtual_axes_core::statistics::mean;
@@ -218,7 +219,7 @@ fn evaluate(
 
 /// Returns the number of samples that count as one independent sample: 1 + 2 Σ ρ_k up to the first
 /// non-positive correlation.
-fn correlation_inflation(residuals: &[f64]) -> f64 {
+pub(super) fn correlation_inflation(residuals: &[f64]) -> f64 {
     let mean = mean(residuals).unwrap_or(f64::NAN);
     let covariance = |lag: usize| {
         let pairs = residuals.iter().zip(residuals.iter().skip(lag));
@@ -246,10 +247,12 @@ mod tests {
             span: 0,
             sample: 0,
             mode: FeedforwardMode::Both,
+            cycle: tsp,
             psec: (0..count).map(psec).collect(),
             first: 0.0,
             period: tsp,
             trace_filter: None,
+            ripple: 1.0,
             start: 0.0,
             position: vec![0.0; count],
             velocity: vec![0.0; count],

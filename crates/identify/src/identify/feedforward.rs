@@ -171,6 +171,7 @@ mod tests {
             period,
             cutoff: 100.0,
             trace_filter: None,
+            torque_constant: None,
             current_lag: 0.0,
             spans: vec![span],
         }

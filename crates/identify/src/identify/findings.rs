@@ -1,9 +1,9 @@
 //! Findings about an identification result.
 
 use super::backlash::lost_motion;
-use super::closed_loop::{Experiment, SimulatedExperiment};
 use super::delays::DelayParameter;
-use super::friction::{friction_current, speed_unit};
+use super::experiment::{Experiment, SimulatedExperiment};
+use super::friction::friction_current;
 use super::gravity::GravityCurrent;
 use super::identification::Identification;
 use super::inertia::fit_inertia;
@@ -13,18 +13,16 @@ use super::segments::{MotionSegment, find_segments};
 use super::setpoints::stride;
 use super::validate::Agreement;
 use crate::recording::{Finding, GaussianFilter, SignalSpan, Signals};
-use virtual_axes_core::config::{AxisKind, Periods};
+use virtual_axes_core::config::{AxisUnits, Periods};
 use virtual_axes_core::statistics::median;
-use virtual_axes_core::units::{DEGREE, MILLISECOND, Rounded, seconds};
+use virtual_axes_core::units::{MILLISECOND, Rounded, seconds};
 
 /// Largest relative difference between refined and measured friction.
 const DISAGREEING: f64 = 0.05;
-/// Largest position residual of a valid model, twice that of the paper, m and rad.
-const DEVIATING: f64 = 20e-6;
-const DEVIATING_ANGLE: f64 = 20e-3 * DEGREE;
-/// Smallest lost motion that is reported, m and rad: errors of the fitted loop look like up to 2 µm.
-const BACKLASH: f64 = 2.5e-6;
-const BACKLASH_ANGLE: f64 = 2.5e-3 * DEGREE;
+/// Largest position residual of a valid model, twice that of the paper, µm and mdeg.
+const DEVIATING: f64 = 20.0;
+/// Smallest lost motion that is reported, µm and mdeg: errors of the fitted loop look like up to 2 µm.
+const BACKLASH: f64 = 2.5;
 /// Sampling period, relative to the position cycle, above which the current between setpoints is not
 /// resolved: at a third of it the inertia by eq. 5 is up to 6 % too small.
 const COARSE: f64 = 0.3;
@@ -44,7 +42,7 @@ pub(super) fn report_delays(experiments: &[Experiment], found: &mut Identificati
                 found.findings.push(Finding::warning(
                     "delay-at-end",
                     format!("the interval of {} ends at the longest permitted delay", which.name()),
-                    "check the gains of the machine file and the active feedforward",
+                    "check the gains of the initial machine and the active feedforward",
                 ));
             }
             continue;
@@ -66,7 +64,7 @@ pub(super) fn report_delays(experiments: &[Experiment], found: &mut Identificati
             Finding::warning(
                 "unseen-delay",
                 format!("{name} is unchanged: the axis cannot be simulated with delays near it"),
-                "check the machine file",
+                "check the initial machine",
             )
         } else {
             Finding::warning(
@@ -172,15 +170,12 @@ pub(super) fn report_aliased_current(
 
 /// Reports backlash, which the model does not have.
 fn report_backlash(inputs: &[IdentificationInput<'_>], found: &mut Identification) {
-    let (limit, unit, name) = match found.axis.kind() {
-        AxisKind::Linear => (BACKLASH, 1e-6, "µm"),
-        AxisKind::Rotary => (BACKLASH_ANGLE, 1e-3 * DEGREE, "mdeg"),
-    };
+    let AxisUnits { error: unit, error_name: name, .. } = found.axis.units();
     if found.axis.transmission.is_some_and(|transmission| transmission.backlash > 0.0) {
         return;
     }
     for (input, agreement) in inputs.iter().zip(&found.agreements) {
-        let Some(lost) = lost_motion(agreement).filter(|lost| *lost > limit) else { continue };
+        let Some(lost) = lost_motion(agreement).filter(|lost| *lost > BACKLASH * unit) else { continue };
         found.findings.push(Finding::warning(
             "backlash",
             format!(
@@ -196,18 +191,17 @@ fn report_backlash(inputs: &[IdentificationInput<'_>], found: &mut Identificatio
 
 /// Reports recordings whose simulated position deviates from the recorded one.
 fn report_positions(inputs: &[IdentificationInput<'_>], found: &mut Identification) {
-    let (limit, unit, name) = match found.axis.kind() {
-        AxisKind::Linear => (DEVIATING, 1e-6, "µm"),
-        AxisKind::Rotary => (DEVIATING_ANGLE, 1e-3 * DEGREE, "mdeg"),
-    };
+    let AxisUnits { error: unit, error_name: name, .. } = found.axis.units();
     for (input, agreement) in inputs.iter().zip(&found.agreements) {
         // Of production traces, whose setpoints are interpolated, the RMS counts.
-        if found.periods.is_some() && agreement.baseline.is_some_and(|baseline| baseline.model <= limit) {
+        if found.periods.is_some()
+            && agreement.baseline.is_some_and(|baseline| baseline.model <= DEVIATING * unit)
+        {
             continue;
         }
         let deviations = agreement.comparisons.iter().flat_map(|c| [c.constant_velocity, c.elsewhere]);
         let worst = deviations.flatten().map(|d| d.max).fold(0.0, f64::max);
-        if worst > limit {
+        if worst > DEVIATING * unit {
             found.findings.push(Finding::warning(
                 "poor-position",
                 format!(
@@ -215,7 +209,7 @@ fn report_positions(inputs: &[IdentificationInput<'_>], found: &mut Identificati
                     input.signals.name,
                     worst / unit
                 ),
-                "check position_loop.gain, the other gains and the periods of the machine file, the active \
+                "check position_loop.gain, the other gains and the periods of the initial machine, the active \
                  feedforward, that PSEC and position have the same zero, and that all signals are sampled at the position \
                  cycles",
             ));
@@ -307,7 +301,7 @@ fn report_inertia(inputs: &[IdentificationInput<'_>], tsp: f64, found: &mut Iden
 /// Reports a refined friction that differs from the friction at constant velocity.
 fn report_friction(found: &mut Identification) {
     let Some(friction) = found.friction.as_ref().filter(|_| found.refinement.is_some()) else { return };
-    let unit = speed_unit(&found.axis);
+    let unit = found.axis.units().speed;
     let part = |velocity: f64| {
         let v = velocity / unit;
         (friction_current(&found.axis.friction, v) / friction.law.at(v) - 1.0).abs()
@@ -321,7 +315,7 @@ fn report_friction(found: &mut Identification) {
                  of the closed loop is wrong",
                 100.0 * worst
             ),
-            "check the gains and periods of the machine file and the active feedforward; record VFFWS and TFFWS",
+            "check the gains and periods of the initial machine and the active feedforward; record VFFWS and TFFWS",
         ));
     }
 }

@@ -6,8 +6,7 @@ use serde::Serialize;
 use super::fit::{BoundedParameter, Effort, NonlinearFit, fit_linear, minimize, r_squared};
 use super::gravity::SteadyCurrent;
 use crate::recording::Finding;
-use virtual_axes_core::config::{AxisConfig, AxisKind, FrictionConfig};
-use virtual_axes_core::units::{METER_PER_MINUTE, RPM};
+use virtual_axes_core::config::{AxisConfig, FrictionConfig};
 
 /// Fewest speeds for the law of four parameters: two more than it has parameters.
 pub const SPEEDS_OF_DOUBLE_EXPONENTIAL: usize = 6;
@@ -75,22 +74,6 @@ pub struct FrictionFit {
     pub asymmetry: f64,
 }
 
-/// Returns the unit of V, m/s or rad/s.
-pub(super) fn speed_unit(axis: &AxisConfig) -> f64 {
-    match axis.kind() {
-        AxisKind::Linear => METER_PER_MINUTE,
-        AxisKind::Rotary => RPM,
-    }
-}
-
-/// Returns the name of the unit of V.
-pub(super) fn speed_unit_name(axis: &AxisConfig) -> &'static str {
-    match axis.kind() {
-        AxisKind::Linear => "m/min",
-        AxisKind::Rotary => "rpm",
-    }
-}
-
 impl LawFit {
     /// Creates a law with the standard errors and the covariance of a, b, c, d.
     pub(super) fn new(
@@ -145,7 +128,7 @@ pub fn fit_friction(
     axis: &AxisConfig,
     findings: &mut Vec<Finding>,
 ) -> Option<FrictionFit> {
-    let unit = speed_unit(axis);
+    let unit = axis.units().speed;
     let of = |directions: &[f64]| -> Vec<Point> {
         let chosen = levels.iter().filter(|l| directions.contains(&l.velocity.signum()));
         chosen.map(|l| (l.velocity.abs() / unit, l.friction * l.velocity.signum())).collect()
@@ -154,7 +137,7 @@ pub fn fit_friction(
     let mut speeds: Vec<f64> = both.iter().map(|point| point.0).collect();
     speeds.sort_by(f64::total_cmp);
     speeds.dedup_by(|next, kept| *next - *kept < 0.03 * *kept);
-    let (name, list) = (speed_unit_name(axis), join_speeds(&speeds));
+    let (name, list) = (axis.units().speed_name, join_speeds(&speeds));
     let missing = |what: String| {
         let top = 20.0_f64.min(axis.limits().velocity / unit);
         let remedy = format!(

@@ -50,8 +50,13 @@ pub struct Identification {
     pub agreements: Vec<Agreement>,
     /// Periods, if the recordings require another position cycle than that of the machine file.
     pub periods: Option<Periods>,
-    /// Feedforward of recordings whose feedforward was not given.
-    pub inferred_feedforward: Option<FeedforwardMode>,
+    /// Active feedforward of each recording, if it was given, recorded or found by the closed loop of any program.
+    pub active_feedforward: Vec<FeedforwardMode>,
+    /// Torque constant, N·m/A (force constant, N/A), from recorded torque and current, with its standard error.
+    pub torque_constant: Option<(f64, f64)>,
+    /// Share of the ripple of the position cycle in the recorded current and its standard error: 1 for the current of an
+    /// instant, 0 for a mean; none if it was not identified.
+    pub current_ripple: Option<(f64, f64)>,
     /// Findings.
     pub findings: Vec<Finding>,
 }
@@ -63,6 +68,11 @@ impl Identification {
         let is_known = self.inertia.is_some() || self.refined(RefinedParameter::Inertia).is_some();
         let masses = self.transmission.as_ref()?.masses.as_ref()?;
         (!is_known).then_some(masses.total)
+    }
+
+    /// Returns the share of the ripple of the position cycle in the recorded current.
+    pub(super) fn ripple(&self) -> f64 {
+        self.current_ripple.map_or(0.0, |(share, _)| share)
     }
 
     /// Returns the identified axis parameters.

@@ -1,7 +1,7 @@
 //! Identification of the equivalent inertia from accelerating samples (Prévost section 3.4, eq. 5).
 
 use super::fit::robust_mean_and_deviation;
-use super::friction::{LawFit, speed_unit};
+use super::friction::LawFit;
 use super::gravity::GravityCurrent;
 use super::segments::{MotionSegment, SegmentKind, largest_magnitude};
 use crate::recording::{Finding, Signals};
@@ -108,7 +108,7 @@ fn evaluate_samples(
         .flat_map(|s| s.acceleration.iter().copied())
         .collect();
     let strong = STRONG * largest_magnitude(&accelerations);
-    let (kt, r, unit) = (axis.motor.torque_constant, axis.transmission_ratio, speed_unit(axis));
+    let (kt, r, unit) = (axis.motor.torque_constant, axis.transmission_ratio, axis.units().speed);
     let limit = SATURATED * axis.motor.max_current;
     let mut found = AcceleratingSamples::default();
     for (number, (signals, segments)) in recordings.iter().enumerate() {

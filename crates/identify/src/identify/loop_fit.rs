@@ -1,20 +1,24 @@
-//! Delays, gains and feedforward weights from the positions of a production trace, jointly by least squares.
+//! Delays, gains and feedforward weights from the positions of any program, jointly by least squares.
 //!
 //! With full velocity feedforward the lag at constant velocity is α, and β shows in accelerations. A shift of the
-//! commanded position makes α continuous during the search; it vanishes if the position cycle of the machine file divides
-//! the lag, otherwise a shorter cycle is chosen.
+//! commanded position makes α continuous during the search. Position cycles that the recording permits are compared by
+//! their residuals, so that the result does not depend on that of the machine file.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::closed_loop::{Experiment, position_residuals};
-use super::covariance::systematic_covariance;
+use super::closed_loop::position_residuals;
+use super::covariance::posterior_covariance;
+use super::delays::correlation_inflation;
+use super::experiment::Experiment;
 use super::feedforward_mode::FeedforwardMode;
 use super::fit::{BoundedParameter, Effort, descend};
 use super::loop_parameter::{LoopParameter, apply, prior};
+use super::resample::interpolation_error;
 use super::trace_experiments::trace_experiments;
 use crate::recording::Signals;
 use virtual_axes_core::config::{AxisConfig, Periods};
+use virtual_axes_core::statistics::rms;
 use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, POSITION_GAIN, seconds};
 
 /// Longest delay, s.
@@ -31,14 +35,22 @@ const KEPT: f64 = 1.1;
 const FOLLOWED: usize = 1;
 /// Gains whose minimum is followed with a free gain; the best one can be a local minimum.
 const FREED: usize = 4;
+/// Minima with a free gain that are followed until they converge.
+const FINISHED: usize = 2;
 /// Longest difference of the lag from a whole number of position cycles, s.
 const GRID_TOLERANCE: f64 = 0.15e-3;
-/// Position cycles that are tried if that of the machine file does not divide the lag, ns.
-const CYCLES: [Nanoseconds; 2] = [2 * MILLISECOND_NS, MILLISECOND_NS];
-/// Residual with a shorter position cycle, relative to that with a cycle that divides the lag, from which on it is taken.
-const SHORTER: f64 = 0.7;
-/// Value of β from which on it is certainly not limited by 0, s.
-const FREE_DELAY: f64 = 1.5e-3;
+/// Position cycles that are compared, ns; the search starts with the first one that the recordings permit.
+const CYCLES: [Nanoseconds; 5] =
+    [2 * MILLISECOND_NS, MILLISECOND_NS, 4 * MILLISECOND_NS, 6 * MILLISECOND_NS, MILLISECOND_NS / 2];
+/// Relative tolerance of the longest position cycle.
+const PERMITTED: f64 = 1e-3;
+/// Relative change of the cost below which a minimum is reached, and largest number of searches for it.
+const CONVERGED: f64 = 2e-3;
+const SEARCHES: usize = 4;
+/// Longest duration of a recording for the search, s.
+const SEARCHED: f64 = 6.0;
+/// Velocity cycles by which β and γ are moved, since they act at velocity cycles only.
+const DELAY_STEPS: [f64; 2] = [-2.0, 2.0];
 
 /// Fitted value with an upper bound of its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,6 +70,8 @@ pub(super) struct LoopFit {
     pub values: Vec<LoopValue>,
     /// RMS position residual, m or rad.
     pub rms: f64,
+    /// Correlations of the fitted values, in their order.
+    pub correlations: DMatrix<f64>,
     /// RMS position residual with the gain of the machine file, if the gain was fitted.
     pub rms_with_given_gain: Option<f64>,
     /// VFFW and lag (s) at both ends of the valley in which the residual hardly changes.
@@ -68,6 +82,12 @@ pub(super) struct LoopFit {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LoopProblem<'a> {
     pub recordings: &'a [(&'a Signals, FeedforwardMode)],
+    /// Longest position cycle that the recordings permit, s, and true if it is certain.
+    pub longest_cycle: (f64, bool),
+    /// Residual of one standard deviation of the prior, m or rad.
+    pub noise: f64,
+    /// Duration of each recording that is simulated, from its first motion on, s.
+    pub duration: f64,
     /// True if the position-loop gain is fitted.
     pub fits_gain: bool,
     /// Position-loop gain of the machine file, s⁻¹.
@@ -84,7 +104,18 @@ struct Candidate {
 impl LoopProblem<'_> {
     fn experiments(&self, periods: &Periods, shift: f64) -> Vec<Experiment> {
         let all = self.recordings.iter().enumerate();
-        all.flat_map(|(k, (signals, mode))| trace_experiments(signals, k, periods, *mode, shift)).collect()
+        let of = |(k, (signals, mode)): (usize, &(&Signals, FeedforwardMode))| {
+            let mut left = self.duration;
+            let mut experiments = trace_experiments(signals, k, periods, (*mode, shift, 1.0));
+            experiments.retain_mut(|experiment| {
+                let is_used = left > 0.0;
+                experiment.shorten(left.max(0.0));
+                left -= experiment.position.len() as f64 * experiment.period;
+                is_used && !experiment.position.is_empty()
+            });
+            experiments
+        };
+        all.flat_map(of).collect()
     }
 
     /// Returns true if a recording has the feedforward `mode`, or more.
@@ -121,7 +152,7 @@ impl LoopProblem<'_> {
     ) -> Option<DVector<f64>> {
         let (moved, shift) = apply(axis, periods, parameters, values);
         let left = position_residuals(&moved, periods, &self.experiments(periods, shift))?;
-        let prior = prior(parameters, values, self.given_gain);
+        let prior = prior(parameters, values, self.given_gain).into_iter().map(|row| self.noise * row);
         Some(DVector::from_iterator(left.len() + prior.len(), left.iter().copied().chain(prior)))
     }
 
@@ -196,6 +227,55 @@ impl LoopProblem<'_> {
         Some(Candidate { values, cost })
     }
 
+    /// Follows a start until the cost hardly changes.
+    fn converge(
+        &self,
+        axis: &AxisConfig,
+        periods: &Periods,
+        parameters: &[LoopParameter],
+        from: &[f64],
+    ) -> Option<Candidate> {
+        let mut best = self.follow(axis, periods, parameters, from)?;
+        for _ in 1..SEARCHES {
+            let next = self.follow(axis, periods, parameters, &best.values)?;
+            let is_reached = next.cost > (1.0 - CONVERGED) * best.cost;
+            if next.cost < best.cost {
+                best = next;
+            }
+            if is_reached {
+                break;
+            }
+        }
+        Some(best)
+    }
+
+    /// Moves β and γ by some velocity cycles, from each of which the others converge, until no move improves the minimum.
+    fn polish(
+        &self,
+        axis: &AxisConfig,
+        periods: &Periods,
+        parameters: &[LoopParameter],
+        mut best: Candidate,
+    ) -> Candidate {
+        let tsv = seconds(periods.velocity);
+        let is_delay = |k: &usize| matches!(parameters[*k], LoopParameter::Beta | LoopParameter::Gamma);
+        for _ in 1..SEARCHES {
+            let moves = (0..parameters.len()).filter(is_delay).flat_map(|k| DELAY_STEPS.map(|by| (k, by)));
+            let next = moves
+                .filter_map(|(k, by)| {
+                    let mut from = best.values.clone();
+                    from[k] = (from[k] + by * tsv).max(0.0);
+                    self.follow(axis, periods, parameters, &from)
+                })
+                .min_by(|a, b| a.cost.total_cmp(&b.cost));
+            match next.filter(|next| next.cost < (1.0 - CONVERGED) * best.cost) {
+                Some(next) => best = next,
+                None => break,
+            }
+        }
+        best
+    }
+
     /// Returns the least minimum: first with some gains held, since a search over all parameters ends in local minima, then
     /// with a free gain.
     fn best(
@@ -227,18 +307,78 @@ impl LoopProblem<'_> {
                 parameters.iter().map(|p| if *p == LoopParameter::Gain { Some(gain) } else { values.next() });
             self.follow(axis, periods, parameters, &from.collect::<Option<Vec<f64>>>()?)
         });
-        freed.min_by(|a, b| a.cost.total_cmp(&b.cost))
+        let mut freed: Vec<Candidate> = freed.collect();
+        freed.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let finished = freed.iter().take(FINISHED);
+        let finished = finished.filter_map(|start| self.converge(axis, periods, parameters, &start.values));
+        finished.min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
+
+    /// Returns the position cycles that the recordings permit, the first one to start with; that of the machine file last.
+    fn cycles(&self, given: &Periods) -> Vec<Periods> {
+        let (longest, is_certain) = self.longest_cycle;
+        let certain = (longest / seconds(given.velocity)).round().max(1.0) as Nanoseconds * given.velocity;
+        let is_permitted = |cycle: &Nanoseconds| {
+            *cycle >= given.velocity
+                && *cycle % given.velocity == 0
+                && seconds(*cycle) <= longest * (1.0 + PERMITTED)
+        };
+        let mut cycles: Vec<Nanoseconds> = match is_certain {
+            true => vec![certain],
+            false => CYCLES.into_iter().chain([given.position]).filter(is_permitted).collect(),
+        };
+        if cycles.is_empty() {
+            cycles.push(given.velocity);
+        }
+        let mut known = Vec::new();
+        cycles.retain(|cycle| {
+            !known.contains(cycle) && {
+                known.push(*cycle);
+                true
+            }
+        });
+        cycles.into_iter().map(|position| Periods { position, ..*given }).collect()
+    }
+
+    /// Returns the RMS residual of the best start, m or rad, without further search.
+    pub fn rms_of_first(&self, axis: &AxisConfig, given: &Periods, lag: f64) -> Option<f64> {
+        let (parameters, periods) = (self.parameters(axis), *self.cycles(given).first()?);
+        let search = LoopProblem { duration: SEARCHED, ..*self };
+        let found = search.best(axis, &periods, &parameters, lag)?;
+        let count = search.residuals(axis, &periods, &parameters, &found.values)?.len().max(1);
+        Some((found.cost / count as f64).sqrt())
     }
 
     /// Fits delays, gains and weights; `lag` is the best constant lag between commanded and actual position, s.
     pub fn fit(&self, axis: &AxisConfig, given: &Periods, lag: f64) -> Option<LoopFit> {
         let parameters = self.parameters(axis);
-        let first = self.best(axis, given, &parameters, lag)?;
-        let (periods, free) = self.with_dividing_cycle(axis, given, &parameters, first);
-        let with_given = self.with_given_gain(axis, &periods, &parameters, &free);
+        let cycles = self.cycles(given);
+        let start = cycles.first()?;
+        // Long recordings are searched in part only.
+        let search = LoopProblem { duration: SEARCHED, ..*self };
+        let first = search.best(axis, start, &parameters, lag)?;
+        let (periods, free) = search.best_cycle((axis, given), &cycles, &parameters, first);
+        let free = search.polish(axis, &periods, &parameters, free);
+        // A residual below that of usual encoders outweighs the prior.
+        let noise = self.correlated_noise(axis, &periods, &parameters, &free.values)?;
+        let problem = LoopProblem { noise: noise.min(self.noise), ..*self };
+        let free = problem.converge(axis, &periods, &parameters, &free.values)?;
+        problem.finish((axis, &periods), parameters, free)
+    }
+
+    /// Rounds the minimum `free` to the delays that a machine file can have, and determines its errors.
+    fn finish(
+        &self,
+        (axis, periods): (&AxisConfig, &Periods),
+        parameters: Vec<LoopParameter>,
+        free: Candidate,
+    ) -> Option<LoopFit> {
+        let with_given = self.with_given_gain(axis, periods, &parameters, &free);
         let given_cost = with_given.as_ref().map(|(_, found)| found.cost);
+        // Without feedforward the gain represents what is left of the lag between two cycles.
+        let is_exact = divides(periods.position, free.values[0]) || self.has_velocity_feedforward(axis);
         // A gain that the motion hardly shows stays that of the machine file.
-        let kept = with_given.filter(|(_, found)| found.cost <= KEPT * KEPT * free.cost);
+        let kept = with_given.filter(|(_, found)| is_exact && found.cost <= KEPT * KEPT * free.cost);
         let is_kept = kept.is_some();
         let (parameters, free) = kept.unwrap_or((parameters, free));
         // The delay of the machine file is a whole number of position cycles.
@@ -251,66 +391,80 @@ impl LoopProblem<'_> {
             let gain = gain.map_or(self.given_gain, |(_, value)| *value);
             between.feedforward.velocity -= (free.values[0] - cycles * tsp) * gain;
         }
-        let (fixed, _) = apply(&between, &periods, &[LoopParameter::Lag], &[cycles * tsp]);
+        let (fixed, _) = apply(&between, periods, &[LoopParameter::Lag], &[cycles * tsp]);
         let others = &parameters[1..];
-        let last = self.follow(&fixed, &periods, others, &free.values[1..])?;
-        let (found, _) = apply(&fixed, &periods, others, &last.values);
-        let errors = self.errors(axis, &periods, &parameters, &free.values)?;
-        let count = self.residuals(&fixed, &periods, others, &last.values)?.len().max(1) as f64;
+        let last = self.converge(&fixed, periods, others, &free.values[1..])?;
+        let (found, _) = apply(&fixed, periods, others, &last.values);
+        let covariance = self.covariance(axis, periods, &parameters, &free.values)?;
+        let errors = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
+        let count = self.residuals(&fixed, periods, others, &last.values)?.len().max(1) as f64;
         let values = parameters.iter().enumerate().map(|(k, &parameter)| LoopValue {
             parameter,
             value: if k == 0 { free.values[0] } else { last.values[k - 1] },
-            error: errors[(k, k)].max(0.0).sqrt(),
+            error: errors[k],
         });
         let rms_with_given_gain = given_cost.filter(|_| !is_kept);
         Some(LoopFit {
             values: values.collect(),
+            correlations: DMatrix::from_fn(parameters.len(), parameters.len(), |j, k| {
+                covariance[(j, k)] / (errors[j] * errors[k])
+            }),
             rms: (last.cost / count).sqrt(),
             rms_with_given_gain: rms_with_given_gain.map(|cost| (cost / count).sqrt()),
-            valley: self.valley(&found, &periods, free.values[0]),
+            valley: self.valley(&found, periods, free.values[0]),
             axis: found,
-            periods,
+            periods: *periods,
         })
     }
 
-    /// Returns the minimum with the longest position cycle that divides its lag: that of the machine file or a shorter one;
-    /// the shortest if none does. A wrong cycle shifts the lag, so it is found anew with each.
+    /// Fits the values of `known` again with the plant of `axis`.
+    pub fn renew(&self, axis: &AxisConfig, known: &LoopFit) -> Option<LoopFit> {
+        let values = known.values.iter().filter(|value| value.parameter != LoopParameter::Lag);
+        let (parameters, from): (Vec<LoopParameter>, Vec<f64>) =
+            values.map(|value| (value.parameter, value.value)).unzip();
+        let found = self.converge(axis, &known.periods, &parameters, &from)?;
+        let count = self.residuals(axis, &known.periods, &parameters, &found.values)?.len().max(1);
+        let mut fit = known.clone();
+        for (parameter, value) in parameters.iter().zip(&found.values) {
+            let of_it = fit.values.iter_mut().filter(|known| known.parameter == *parameter);
+            of_it.for_each(|known| known.value = *value);
+        }
+        fit.axis = apply(axis, &known.periods, &parameters, &found.values).0;
+        fit.rms = (found.cost / count as f64).sqrt();
+        Some(fit)
+    }
+
+    /// Returns the position cycle with the least residual and its minimum. Among cycles with about the same residual, that of
+    /// the machine file is preferred if it divides the lag, then the first one.
     ///
-    /// Since a motion shows β + Tsp, β at 0 can mean that the cycle is too long: then a shorter one is taken if it leaves a
-    /// clearly smaller residual.
-    fn with_dividing_cycle(
+    /// A motion shows β + Tsp, so the others start with β changed by the difference of the cycles.
+    fn best_cycle(
         &self,
-        axis: &AxisConfig,
-        given: &Periods,
+        (axis, given): (&AxisConfig, &Periods),
+        cycles: &[Periods],
         parameters: &[LoopParameter],
         first: Candidate,
     ) -> (Periods, Candidate) {
-        let mut best = (*given, first);
-        for cycle in CYCLES.iter().filter(|cycle| **cycle < given.position && **cycle % given.velocity == 0) {
-            let (before, candidate) = &best;
-            let is_dividing = divides(before.position, candidate.values[0]);
-            if is_dividing && !is_at_least_delay(parameters, &candidate.values) {
-                break;
-            }
-            let periods = Periods { position: *cycle, ..*given };
-            // The velocity feedforward is a difference over the position cycle: β + Tsp is what the motion shows.
-            let change = seconds(before.position) - seconds(*cycle);
-            let from = parameters.iter().zip(&candidate.values).map(|(parameter, value)| match parameter {
-                LoopParameter::Beta | LoopParameter::Gamma => value + change,
+        let Some(start) = cycles.first() else { return (*given, first) };
+        let others = cycles.iter().skip(1).filter_map(|periods| {
+            let change = seconds(start.position) - seconds(periods.position);
+            let from = parameters.iter().zip(&first.values).map(|(parameter, value)| match parameter {
+                LoopParameter::Beta | LoopParameter::Gamma => (value + change).max(0.0),
                 _ => *value,
             });
-            let from: Vec<f64> = from.collect();
-            let followed = if is_dividing {
-                self.best(axis, &periods, parameters, candidate.values[0])
-            } else {
-                self.follow(axis, &periods, parameters, &from)
-            };
-            let Some(found) = followed else { continue };
-            if !is_dividing || found.cost < SHORTER * SHORTER * candidate.cost {
-                best = (periods, found);
-            }
-        }
-        best
+            let found = self.converge(axis, periods, parameters, &from.collect::<Vec<f64>>())?;
+            Some((*periods, found))
+        });
+        let mut all: Vec<(Periods, Candidate)> = others.collect();
+        all.push((*start, first.clone()));
+        let least = all.iter().map(|(_, found)| found.cost).fold(f64::INFINITY, f64::min);
+        let close = all.into_iter().filter(|(_, found)| found.cost <= KEPT * KEPT * least);
+        let preference = |(periods, found): &(Periods, Candidate)| {
+            let cycle = periods.position;
+            let is_dividing = divides(cycle, found.values[0]);
+            (is_dividing && cycle == given.position, cycle == start.position, is_dividing, cycle)
+        };
+        close.max_by_key(preference).unwrap_or((*start, first))
     }
 
     /// Returns the minimum with the gain of the machine file, and its parameters; none if the gain is not fitted.
@@ -325,11 +479,29 @@ impl LoopProblem<'_> {
         let pairs =
             parameters.iter().zip(&free.values).filter(|(parameter, _)| **parameter != LoopParameter::Gain);
         let (others, values): (Vec<LoopParameter>, Vec<f64>) = pairs.map(|(p, v)| (*p, *v)).unzip();
-        let found = self.follow(axis, periods, &others, &values)?;
+        let found = self.converge(axis, periods, &others, &values)?;
         Some((others, found))
     }
 
-    fn errors(
+    /// Returns the standard deviation of a residual that counts as independent, m or rad.
+    fn correlated_noise(
+        &self,
+        axis: &AxisConfig,
+        periods: &Periods,
+        parameters: &[LoopParameter],
+        values: &[f64],
+    ) -> Option<f64> {
+        let left = self.residuals(axis, periods, parameters, values)?;
+        let data = left.as_slice().get(..left.len().checked_sub(parameters.len())?)?;
+        let noise = rms(data.iter().copied())? * correlation_inflation(data).sqrt();
+        let tsp = seconds(periods.position);
+        let coarse = self.recordings.iter().filter(|(signals, _)| signals.period > (1.0 + PERMITTED) * tsp);
+        let setpoints =
+            coarse.flat_map(|(signals, _)| &signals.spans).filter_map(|span| span.psec.as_deref());
+        Some(setpoints.map(interpolation_error).fold(noise, f64::hypot))
+    }
+
+    fn covariance(
         &self,
         axis: &AxisConfig,
         periods: &Periods,
@@ -337,7 +509,11 @@ impl LoopProblem<'_> {
         values: &[f64],
     ) -> Option<DMatrix<f64>> {
         let bounded = self.bounded(periods, parameters, values);
-        systematic_covariance(&bounded, values, |x| self.residuals(axis, periods, parameters, x))
+        let noise = self.correlated_noise(axis, periods, parameters, values)?.max(f64::MIN_POSITIVE);
+        let problem = LoopProblem { noise, ..*self };
+        let residuals = |x: &[f64]| problem.residuals(axis, periods, parameters, x);
+        let data = residuals(values)?.len().checked_sub(parameters.len())?;
+        posterior_covariance(&bounded, values, residuals, &vec![None; data], noise)
     }
 
     /// Returns VFFW and lag at two standard errors from the fit, with VFFW as a further parameter.
@@ -357,16 +533,14 @@ impl LoopProblem<'_> {
             BoundedParameter { start: lag, low: 0.0, high: LONGEST, step: 5e-5 },
             BoundedParameter { start: weight, low: 0.0, high: 2.0, step: 2e-3 },
         ];
-        let covariance = systematic_covariance(&bounded, &[lag, weight], lags)?;
+        let left = lags(&[lag, weight])?;
+        let data = left.len().checked_sub(1)?;
+        let noise = self.correlated_noise(axis, periods, &[LoopParameter::Lag], &[lag])?;
+        let covariance = posterior_covariance(&bounded, &[lag, weight], lags, &vec![None; data], noise)?;
         let half = 2.0 * covariance[(1, 1)].max(0.0).sqrt();
         let slope = covariance[(0, 1)] / covariance[(1, 1)];
         Some([-half, half].map(|change| (weight + change, lag + slope * change)))
     }
-}
-
-/// Returns true if β is at its lower bound.
-fn is_at_least_delay(parameters: &[LoopParameter], values: &[f64]) -> bool {
-    parameters.iter().zip(values).any(|(p, value)| *p == LoopParameter::Beta && *value < FREE_DELAY)
 }
 
 /// Returns true if the lag, s, is a whole number of cycles.

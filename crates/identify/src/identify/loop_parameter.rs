@@ -3,8 +3,8 @@
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::units::{MICROSECOND_NS, Nanoseconds, seconds};
 
-/// Residual of one standard deviation of the prior, m or rad: a few encoder increments.
-const PRIOR: f64 = 5e-6;
+/// Largest residual of one standard deviation of the prior, m or rad: a few encoder increments.
+pub(super) const PRIOR: f64 = 5e-6;
 /// Usual ratio of velocity-loop gain to inertia, s⁻¹.
 const BANDWIDTH: f64 = 240.0;
 
@@ -59,7 +59,7 @@ pub(super) fn apply(
     (axis, shift)
 }
 
-/// Returns the residuals of a weak prior, m or rad. Production traces do not determine all parameters of the velocity loop
+/// Returns the distances from a weak prior, in its standard deviations. Production traces do not determine all parameters of the velocity loop
 /// and of the torque feedforward; the prior keeps them at usual values.
 pub(super) fn prior(parameters: &[LoopParameter], values: &[f64], given_gain: f64) -> Vec<f64> {
     let of = |parameter: LoopParameter| {
@@ -74,7 +74,7 @@ pub(super) fn prior(parameters: &[LoopParameter], values: &[f64], given_gain: f6
         LoopParameter::IntegralTime => (value * bandwidth / 1.5).ln() / 0.4,
         LoopParameter::TorqueRatio => (value - 1.0) / 0.1,
     };
-    parameters.iter().zip(values).map(|pair| PRIOR * distance(pair)).collect()
+    parameters.iter().zip(values).map(distance).collect()
 }
 
 fn nanoseconds(time: f64) -> Nanoseconds {

@@ -2,7 +2,7 @@
 
 use super::feedforward_mode::FeedforwardMode;
 use super::friction::Breakaway;
-use crate::recording::Signals;
+use crate::recording::{Signals, StatedValues};
 
 /// Recording with its known conditions.
 #[derive(Debug, Clone, Copy)]
@@ -22,6 +22,8 @@ pub struct IdentificationOptions {
     pub refine: RefinementScope,
     /// True if the presliding is identified from reversals.
     pub presliding: bool,
+    /// Values of the axis that the user has stated, against which the result is checked.
+    pub stated: StatedValues,
 }
 
 /// Parameters that the closed-loop refinement changes; the others keep the result of the steps.
@@ -37,19 +39,38 @@ pub struct RefinementScope {
     pub feedforward: bool,
     /// Position-loop gain Kp, from recordings that are coarser than the position cycle.
     pub gain: bool,
+    /// Position cycle, where the recordings do not show it.
+    pub position_cycle: bool,
 }
 
 impl RefinementScope {
     /// All parameters.
-    pub const ALL: RefinementScope =
-        RefinementScope { inertia: true, friction: true, gravity: true, feedforward: true, gain: true };
+    pub const ALL: RefinementScope = RefinementScope {
+        inertia: true,
+        friction: true,
+        gravity: true,
+        feedforward: true,
+        gain: true,
+        position_cycle: true,
+    };
     /// No refinement, only the steps of the paper.
-    pub const NONE: RefinementScope =
-        RefinementScope { inertia: false, friction: false, gravity: false, feedforward: false, gain: false };
+    pub const NONE: RefinementScope = RefinementScope {
+        inertia: false,
+        friction: false,
+        gravity: false,
+        feedforward: false,
+        gain: false,
+        position_cycle: false,
+    };
 }
 
 impl Default for IdentificationOptions {
     fn default() -> Self {
-        IdentificationOptions { i0: Breakaway::Held, refine: RefinementScope::ALL, presliding: false }
+        IdentificationOptions {
+            i0: Breakaway::Held,
+            refine: RefinementScope::ALL,
+            presliding: false,
+            stated: StatedValues::ALL,
+        }
     }
 }

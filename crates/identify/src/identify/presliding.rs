@@ -12,7 +12,7 @@ mod reversal;
 
 use self::profile::LengthProfile;
 pub(super) use self::profile::student;
-use self::reversal::{Reversal, SpanMotion};
+use self::reversal::{Reversal, SpanMotion, WINDOW};
 use crate::recording::{Finding, GaussianFilter, Signals, deviation};
 use virtual_axes_core::config::{AxisConfig, AxisKind, PreslidingConfig};
 use virtual_axes_core::statistics::{mean, median};
@@ -28,8 +28,6 @@ const SAMPLES: usize = 16;
 const NOISE: f64 = 20.0;
 /// Fewest encoder increments within the length of presliding.
 const INCREMENTS: f64 = 10.0;
-/// Window on both sides of a reversal, in lengths of presliding: exp(−6) of the friction is left.
-const WINDOW: f64 = 6.0;
 /// Travel before and after a reversal, in lengths of presliding.
 const TRAVEL: f64 = 12.0;
 /// Trial lengths per decade in the search, and about its result.
@@ -41,10 +39,6 @@ const SETTLED: f64 = 0.03;
 const BELOW: f64 = 0.05;
 /// Passes: the window, the filter and the choice of reversals depend on the length.
 const PASSES: usize = 6;
-/// Duration of the filter relative to the time in which an axis passes the length.
-const FILTER: f64 = 0.12;
-/// Standard errors of a significant damping.
-const SIGNIFICANT: f64 = 3.0;
 /// Standard error of the logarithm of the stiffness that all reversals share: errors of the inertia, of the friction law and
 /// of the sampling; and that of an encoder increment relative to the length.
 const SYSTEMATIC: f64 = 0.02;

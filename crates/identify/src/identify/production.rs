@@ -1,56 +1,50 @@
-//! Identification from production traces: recordings that are sampled more coarsely than the position cycle, usually with
-//! feedforward active and with few phases of constant velocity.
+//! Identification from recordings of any program, sampled at any rate, usually with feedforward active and with few phases
+//! of constant velocity.
 //!
 //! 1. Inertia, friction and gravity by regression of the current over all samples in motion.
-//! 2. Delays, gains and torque feedforward jointly from the positions, on the closed loop.
-//! 3. Checks: results that are worse than a constant lag, or implausibly far from the machine file, are invalid.
+//! 2. Feedforward as recorded; delays, gains and the other weights jointly from the positions, on the closed loop.
+//! 3. Inertia, friction and gravity again, with the ripple that the closed loop causes in the current.
+//! 4. Checks: results that are worse than a constant lag, or implausibly far from the machine file, are invalid.
 
+use super::closed_loop::simulate;
 use super::delays::{DelayFit, DelayParameter};
+use super::experiment::Experiment;
 use super::feedforward_mode::FeedforwardMode;
-use super::gravity::{GravityCurrent, GravityFit};
+use super::gravity::GravityCurrent;
 use super::identification::Identification;
 use super::loop_fit::{LoopFit, LoopProblem};
-use super::loop_parameter::LoopParameter;
+use super::loop_parameter::{LoopParameter, PRIOR};
 use super::options::{IdentificationInput, RefinementScope};
-use super::plant_regression::{PlantRegression, fit_plant_by_regression};
+use super::plant_regression::{CurrentRipple, PlantRegression, fit_plant};
+use super::recorded_feedforward::{fit_recorded_feedforward, recorded_feedforward};
 use super::refine::{RefinedParameter, RefinedValue, Refinement};
 use super::resample::interpolation_error;
-use super::setpoints::stride;
+use super::setpoints::{longest_cycle, stride};
+use super::trace_experiments::trace_experiments;
 use super::validate::constant_lag;
 use crate::recording::{Finding, Signals};
-use virtual_axes_core::config::{AxisConfig, AxisKind, Periods, PositionControllerConfig};
+use virtual_axes_core::config::{AxisConfig, AxisKind, AxisUnits, Periods};
 use virtual_axes_core::statistics::mean;
 use virtual_axes_core::units::{
     DEGREE, MICROSECOND_NS, MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, seconds,
 };
 
+/// Part of the travel in the direction that is seldom, from which on the axis moves in both.
+const BOTH_WAYS: f64 = 0.02;
 /// Travel of an axis that moves, m or rad.
 const SHORTEST_TRAVEL: f64 = 1e-3;
-/// Standard errors of a significant gravity.
-const SIGNIFICANT: f64 = 3.0;
-/// Gravity relative to friction below which it is neglected.
-const RELEVANT: f64 = 0.02;
 /// Relative change of the gain from which that of the machine file does not fit.
 const GAIN_CHANGE: f64 = 0.15;
 /// Ratio of the residuals with and without feedforward from which the smaller one is certain.
 const CLEAR: f64 = 1.5;
-/// Standard errors of a delay within its interval.
+/// Ratio of two residuals that explain a motion alike.
+const ALIKE: f64 = 1.1;
+/// Number of times that the plant is identified with the ripple of the loop.
+const PLANT_PASSES: usize = 2;
+/// Longest duration of motion of a recording that is simulated for delays and gains, s; all of it is compared at the end.
+const FITTED: f64 = 20.0;
+/// Standard errors of a value within its interval.
 const INTERVAL: f64 = 2.0;
-
-/// Returns true if the recordings can be identified as production traces only: with PSEC, but at a sampling period that
-/// is no integer fraction of the position cycle.
-pub fn are_production_traces(
-    inputs: &[IdentificationInput<'_>],
-    axis: &AxisConfig,
-    periods: &Periods,
-) -> bool {
-    let tsp = seconds(periods.position);
-    let is_coarse = |signals: &Signals| stride(signals.period, tsp).is_none();
-    let with_psec = |signals: &Signals| signals.spans.iter().any(|span| span.psec.is_some());
-    !inputs.is_empty()
-        && axis.position_loop.controller == PositionControllerConfig::Cascade
-        && inputs.iter().all(|input| is_coarse(input.signals) && with_psec(input.signals))
-}
 
 /// Identifies plant and loop; `found` contains the machine file and receives the results.
 pub(super) fn identify_production(
@@ -67,94 +61,211 @@ pub(super) fn identify_production(
         ));
         return;
     }
-    report_interpolation(inputs, found);
     let signals: Vec<&Signals> = inputs.iter().map(|input| input.signals).collect();
-    match fit_plant_by_regression(&signals, &found.axis) {
-        Some(plant) => apply_plant(plant, found),
-        None => found.findings.push(Finding::missing(
+    if !moves_both_ways(&signals) {
+        found.findings.push(Finding::warning(
+            "one-direction",
+            "the axis moves in one direction only: the shape of the friction and the standstills alone separate friction and gravity",
+            "record each speed in both directions",
+        ));
+    }
+    let has_current = signals.iter().any(|signals| signals.spans.iter().any(|span| span.current.is_some()));
+    let plant = fit_plant(&signals, &found.axis, None);
+    if let Some(plant) = &plant {
+        apply_plant(plant, found);
+    } else {
+        found.findings.push(Finding::missing(
             "few-moves",
-            match signals.iter().any(|signals| signals.spans.iter().any(|span| span.current.is_some())) {
-                true => "no inertia, friction and gravity: the recordings have less than four moves with current",
-                false => "no inertia, friction and gravity: no recording has a current; those of the machine file are used",
+            match has_current {
+                true => "no inertia, friction and gravity: the recordings have hardly any motion with current",
+                false => "no inertia, friction and gravity: no recording has a current; those of the initial machine are used",
             },
             "record the current of a program with moves in both directions",
-        )),
+        ));
     }
-    if scope == RefinementScope::NONE {
-        return;
+    let has_setpoints = signals.iter().any(|signals| signals.spans.iter().any(|span| span.psec.is_some()));
+    if !has_setpoints {
+        found.findings.push(Finding::missing(
+            "no-setpoints",
+            "no delays, gains and feedforward: no recording contains PSEC",
+            "record the position setpoints (PSEC)",
+        ));
     }
-    let given = |mode: FeedforwardMode| -> Vec<(&Signals, FeedforwardMode)> {
-        inputs.iter().map(|input| (input.signals, input.feedforward.unwrap_or(mode))).collect()
-    };
-    let active = match found.axis.feedforward.torque != 0.0 {
-        true => FeedforwardMode::Both,
-        false => FeedforwardMode::Velocity,
-    };
-    let mut best = fit_loop(&given(active), periods, scope, &found.axis).map(|fit| (active, fit));
-    let is_inferred = inputs.iter().any(|input| input.feedforward.is_none());
-    if is_inferred {
-        let without = fit_loop(&given(FeedforwardMode::Off), periods, scope, &found.axis);
-        best = infer_feedforward(best, without.map(|fit| (FeedforwardMode::Off, fit)), found);
+    if scope != RefinementScope::NONE && has_setpoints {
+        identify_loop(inputs, periods, (scope, plant.is_some()), found);
     }
-    match best {
-        Some((mode, fit)) => {
-            found.inferred_feedforward = is_inferred.then_some(mode);
-            apply_loop(&fit, found);
-        }
-        None => found.findings.push(Finding::missing(
-            "no-loop",
-            "no delays and gains: the closed loop cannot be simulated near the recorded motion",
-            "check lead, gains and periods of the machine file; inertia, friction and gravity are those of the current alone",
-        )),
+    if let Some(plant) = plant {
+        report_plant(found, &plant);
+        report_ripple(inputs, periods, found);
     }
 }
 
-/// Fits the loop, starting from the mean constant lag.
-fn fit_loop(
-    recordings: &[(&Signals, FeedforwardMode)],
+/// Identifies the loop, and the plant again from the current that the loop logs if `has_plant`.
+fn identify_loop(
+    inputs: &[IdentificationInput<'_>],
     periods: &Periods,
-    scope: RefinementScope,
-    axis: &AxisConfig,
-) -> Option<LoopFit> {
+    (scope, has_plant): (RefinementScope, bool),
+    found: &mut Identification,
+) {
+    found.feedforward = fit_recorded_feedforward(inputs, found.axis.transmission_ratio);
+    if let Some(velocity) = &found.feedforward.velocity {
+        found.axis.feedforward.velocity = velocity.value.max(0.0);
+    }
+    match (&found.feedforward.torque, found.feedforward.is_torque_zero) {
+        (Some(torque), _) => found.axis.feedforward.torque = torque.value.max(0.0),
+        (None, true) => found.axis.feedforward.torque = 0.0,
+        (None, false) => {}
+    }
+    let longest_cycle = inputs.iter().map(|input| longest_cycle(input.signals));
+    let longest_cycle = match scope.position_cycle {
+        true => longest_cycle.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, false)),
+        false => (seconds(periods.position), true),
+    };
+    let given_gain = found.axis.position_loop.gain;
+    let problem = LoopProblem {
+        recordings: &[],
+        longest_cycle,
+        noise: PRIOR,
+        duration: FITTED,
+        fits_gain: scope.gain,
+        given_gain,
+    };
+    let mut findings = Vec::new();
+    let modes = active_feedforward(inputs, &found.axis, &mut findings, |recordings, lag| {
+        LoopProblem { recordings, ..problem }.rms_of_first(&found.axis, periods, lag)
+    });
+    let recordings: Vec<(&Signals, FeedforwardMode)> =
+        inputs.iter().zip(&modes).map(|(input, mode)| (input.signals, *mode)).collect();
+    let problem = LoopProblem { recordings: &recordings, ..problem };
+    let lag = mean_lag(&recordings, &found.axis);
+    let fit = lag.and_then(|lag| problem.fit(&found.axis, periods, lag));
+    found.findings.append(&mut findings);
+    found.active_feedforward = modes;
+    let Some(mut fit) = fit else {
+        found.findings.push(Finding::missing(
+            "no-loop",
+            "no delays and gains: the closed loop cannot be simulated near the recorded motion",
+            "check lead, gains and periods of the initial machine; inertia, friction and gravity are those of the current alone",
+        ));
+        return;
+    };
+    let before = found.axis.clone();
+    for _ in 0..if has_plant { PLANT_PASSES } else { 0 } {
+        found.axis = fit.axis.clone();
+        let ripple = simulated_ripple(&recordings, &fit);
+        let signals: Vec<&Signals> = recordings.iter().map(|(signals, _)| *signals).collect();
+        let Some(plant) = fit_plant(&signals, &found.axis, Some(&ripple)) else { break };
+        apply_plant(&plant, found);
+        found.current_ripple = plant.ripple;
+        // The velocity loop keeps its bandwidth.
+        fit.axis = found.axis.clone();
+        match problem.renew(&fit.axis, &fit) {
+            Some(renewed) => fit = renewed,
+            None => break,
+        }
+    }
+    apply_loop(&fit, &before, found);
+    report_interpolation(inputs, seconds(fit.periods.position), found);
+}
+
+/// Returns the ripple of the current at the samples: the simulated current of an instant minus the mean over a
+/// position cycle.
+fn simulated_ripple(recordings: &[(&Signals, FeedforwardMode)], fit: &LoopFit) -> CurrentRipple {
+    let of = |(k, (signals, mode)): (usize, &(&Signals, FeedforwardMode))| {
+        let mut ripple: Vec<Vec<f64>> =
+            signals.spans.iter().map(|span| vec![f64::NAN; span.position.len()]).collect();
+        for instant in trace_experiments(signals, k, &fit.periods, (*mode, 0.0, 1.0)) {
+            let mean = Experiment { ripple: 0.0, ..instant.clone() };
+            let simulated = [&instant, &mean].map(|experiment| simulate(&fit.axis, &fit.periods, experiment));
+            let [Ok(at), Ok(mean)] = simulated else { continue };
+            let difference = at.current.iter().zip(&mean.current).map(|(a, m)| a - m);
+            let to = ripple[instant.span].iter_mut().skip(instant.sample);
+            to.zip(difference).for_each(|(to, value)| *to = value);
+        }
+        ripple
+    };
+    recordings.iter().enumerate().map(of).collect()
+}
+
+/// Returns the mean lag of the recordings behind PSEC, s, without that of the position loop.
+fn mean_lag(recordings: &[(&Signals, FeedforwardMode)], axis: &AxisConfig) -> Option<f64> {
     let starts = recordings.iter().filter_map(|(signals, mode)| {
         let (lag, _) = constant_lag(signals)?;
         // Without feedforward the axis lags by 1 / Kp in addition.
         let off = *mode == FeedforwardMode::Off;
         Some(if off { (lag - 1.0 / axis.position_loop.gain).max(0.0) } else { lag })
     });
-    let lag = mean(&starts.collect::<Vec<f64>>())?;
-    LoopProblem { recordings, fits_gain: scope.gain, given_gain: axis.position_loop.gain }
-        .fit(axis, periods, lag)
+    mean(&starts.collect::<Vec<f64>>())
 }
 
-/// Returns the fit with or without feedforward, whichever leaves the smaller residual, and reports it.
-fn infer_feedforward(
-    with: Option<(FeedforwardMode, LoopFit)>,
-    without: Option<(FeedforwardMode, LoopFit)>,
-    found: &mut Identification,
-) -> Option<(FeedforwardMode, LoopFit)> {
-    let (Some((mode, with)), Some((off, without))) = (with.clone(), without.clone()) else {
-        return with.or(without);
+/// Returns the active feedforward of each recording: as given, as recorded, or with the smaller residual of the closed loop,
+/// `rms`. Of two that explain the motion alike, the one with less feedforward is taken.
+fn active_feedforward(
+    inputs: &[IdentificationInput<'_>],
+    axis: &AxisConfig,
+    findings: &mut Vec<Finding>,
+    rms: impl Fn(&[(&Signals, FeedforwardMode)], f64) -> Option<f64>,
+) -> Vec<FeedforwardMode> {
+    let mut of = |input: &IdentificationInput<'_>| {
+        if let Some(mode) = input.feedforward.or_else(|| recorded_feedforward(input.signals)) {
+            return mode;
+        }
+        let has_velocity = input.signals.spans.iter().any(|span| span.velocity_feedforward.is_some());
+        let modes = FeedforwardMode::ALL.into_iter().filter(|mode| match mode {
+            FeedforwardMode::Off => !has_velocity,
+            FeedforwardMode::Velocity => true,
+            FeedforwardMode::Both => axis.feedforward.torque != 0.0,
+        });
+        let tried = modes.filter_map(|mode| {
+            let recordings = [(input.signals, mode)];
+            Some((mode, rms(&recordings, mean_lag(&recordings, axis)?)?))
+        });
+        let tried: Vec<(FeedforwardMode, f64)> = tried.collect();
+        let least = tried.iter().map(|(_, rms)| *rms).fold(f64::INFINITY, f64::min);
+        let Some((mode, _)) = tried.iter().find(|(_, rms)| *rms <= ALIKE * least) else {
+            return FeedforwardMode::Both;
+        };
+        report_inferred((&input.signals.name, axis), (*mode, &tried), findings);
+        *mode
     };
-    let (unit, name) = position_unit(&found.axis);
-    let residuals = format!(
-        "{:.1} {name} RMS with feedforward, {:.1} {name} without",
-        with.rms / unit,
-        without.rms / unit
-    );
-    if with.rms.max(without.rms) < CLEAR * with.rms.min(without.rms) {
-        found.findings.push(Finding::invalid(
+    inputs.iter().map(&mut of).collect()
+}
+
+/// Reports a feedforward that was found by the residuals.
+fn report_inferred(
+    (recording, axis): (&str, &AxisConfig),
+    (mode, tried): (FeedforwardMode, &[(FeedforwardMode, f64)]),
+    findings: &mut Vec<Finding>,
+) {
+    let AxisUnits { error: unit, error_name: name, .. } = axis.units();
+    let residuals: Vec<String> =
+        tried.iter().map(|(mode, rms)| format!("{} {:.1} {name}", mode.name(), rms / unit)).collect();
+    let residuals = residuals.join(", ");
+    let least = |is_off: bool| {
+        let of_it = tried.iter().filter(|(mode, _)| (*mode == FeedforwardMode::Off) == is_off);
+        of_it.map(|(_, rms)| *rms).fold(f64::INFINITY, f64::min)
+    };
+    let (off, on) = (least(true), least(false));
+    if off.max(on) < CLEAR * off.min(on) {
+        findings.push(Finding::invalid(
             "feedforward-unknown",
-            format!("the motion does not show whether feedforward was active: {residuals}"),
+            format!("{recording}: the motion does not show whether feedforward was active: RMS residuals {residuals}"),
             "give --feedforward off, velocity or both",
         ));
     }
-    let (mode, fit) = if with.rms <= without.rms { (mode, with) } else { (off, without) };
-    found.findings.push(Finding::note(
+    findings.push(Finding::note(
         "feedforward-inferred",
-        format!("feedforward {} is assumed: {residuals}", mode.name()),
+        format!("{recording}: feedforward {} is assumed: RMS residuals {residuals}", mode.name()),
     ));
-    Some((mode, fit))
+}
+
+/// Returns true if a considerable part of the motion has each direction.
+fn moves_both_ways(signals: &[&Signals]) -> bool {
+    let velocities =
+        || signals.iter().flat_map(|signals| &signals.spans).flat_map(|span| span.velocity.iter());
+    let travel = |sign: f64| velocities().map(|v| (sign * v).max(0.0)).sum::<f64>();
+    let (forward, backward) = (travel(1.0), travel(-1.0));
+    forward.min(backward) > BOTH_WAYS * forward.max(backward)
 }
 
 /// Returns true if the position covers more than some encoder increments.
@@ -165,9 +276,9 @@ fn moves(signals: &Signals) -> bool {
 }
 
 /// Reports the error of the interpolated setpoints.
-fn report_interpolation(inputs: &[IdentificationInput<'_>], found: &mut Identification) {
-    let (unit, name) = position_unit(&found.axis);
-    for input in inputs {
+fn report_interpolation(inputs: &[IdentificationInput<'_>], tsp: f64, found: &mut Identification) {
+    let AxisUnits { error: unit, error_name: name, .. } = found.axis.units();
+    for input in inputs.iter().filter(|input| stride(input.signals.period, tsp).is_none()) {
         let psec = input.signals.spans.iter().filter_map(|span| span.psec.as_deref());
         let error = psec.map(interpolation_error).fold(0.0, f64::max);
         found.findings.push(Finding::note(
@@ -182,15 +293,28 @@ fn report_interpolation(inputs: &[IdentificationInput<'_>], found: &mut Identifi
     }
 }
 
-fn position_unit(axis: &AxisConfig) -> (f64, &'static str) {
-    match axis.kind() {
-        AxisKind::Linear => (1e-6, "µm"),
-        AxisKind::Rotary => (1e-3 * DEGREE, "mdeg"),
+/// Sets inertia, friction and gravity by the regression.
+fn apply_plant(plant: &PlantRegression, found: &mut Identification) {
+    let axis = &mut found.axis;
+    if is_inertia_known(plant) {
+        axis.motor.inertia = plant.inertia.value;
     }
+    axis.friction = plant.friction.law.config;
+    if let (Some((weight, _)), AxisKind::Linear) = (plant.gravity.weight, axis.kind()) {
+        axis.gravity.weight = if plant.gravity.model == GravityCurrent::default() { 0.0 } else { weight };
+    }
+    found.gravity = Some(plant.gravity.clone());
+    found.inertia = is_inertia_known(plant).then(|| plant.inertia.clone());
+    found.friction = Some(plant.friction.clone());
 }
 
-/// Sets inertia, friction and gravity by the regression.
-fn apply_plant(plant: PlantRegression, found: &mut Identification) {
+/// Returns true if the 95 % interval of the inertia is narrower than its value.
+fn is_inertia_known(plant: &PlantRegression) -> bool {
+    plant.inertia.value > INTERVAL * plant.inertia.error
+}
+
+/// Reports correlated values of the plant, and what was not identified.
+fn report_plant(found: &mut Identification, plant: &PlantRegression) {
     for (a, b, rho) in &plant.collinear {
         found.findings.push(Finding::note(
             "correlated",
@@ -199,42 +323,46 @@ fn apply_plant(plant: PlantRegression, found: &mut Identification) {
             ),
         ));
     }
-    let axis = &mut found.axis;
-    axis.motor.inertia = plant.inertia.value;
-    axis.friction = plant.friction.law.config;
-    let gravity = significant_gravity(plant.gravity, &plant.friction.law.config);
-    if let (Some((weight, _)), AxisKind::Linear) = (gravity.weight, axis.kind()) {
-        axis.gravity.weight = if gravity.model == GravityCurrent::default() { 0.0 } else { weight };
+    let axis = &found.axis;
+    if found.inertia.is_none() {
+        found.findings.push(Finding::missing(
+            "no-acceleration",
+            format!(
+                "the current gives an inertia of {:.4} ± {:.4}, an interval wider than the value: that of the initial machine is used",
+                plant.inertia.value, plant.inertia.error
+            ),
+            "record faster moves with stronger accelerations",
+        ));
     }
     if axis.kind() == AxisKind::Rotary {
         let what = format!(
-            "gravity.tilt_nm {} and gravity.tilt_phase_deg {} are those of the machine file: gravity of a rotary axis is \
+            "gravity.tilt_nm {} and gravity.tilt_phase_deg {} are those of the initial machine: gravity of a rotary axis is \
              identified from a campaign only",
             Rounded(axis.gravity.tilt),
             Rounded(axis.gravity.phase / DEGREE)
         );
         found.findings.push(Finding::note("gravity-kept", what));
     }
-    found.gravity = Some(gravity);
-    found.inertia = Some(plant.inertia);
-    found.friction = Some(plant.friction);
 }
 
-/// Sets a gravity that the data cannot tell from zero to zero.
-fn significant_gravity(
-    mut gravity: GravityFit,
-    friction: &virtual_axes_core::config::FrictionConfig,
-) -> GravityFit {
-    let (value, error) = (gravity.current.constant.abs(), gravity.error.constant);
-    if value < SIGNIFICANT * error || value < RELEVANT * (friction.a + friction.c).abs() {
-        gravity.model = GravityCurrent::default();
-    }
-    gravity
+/// Reports how the control logs the current, where the recordings sample each position cycle at one phase.
+fn report_ripple(inputs: &[IdentificationInput<'_>], periods: &Periods, found: &mut Identification) {
+    let tsp = seconds(found.periods.unwrap_or(*periods).position);
+    let is_at_one_phase = inputs.iter().any(|input| stride(tsp, input.signals.period).is_some());
+    let Some((share, error)) = found.current_ripple.filter(|_| is_at_one_phase) else { return };
+    found.findings.push(Finding::note(
+        "current-ripple",
+        format!(
+            "the current contains {:.0} ± {:.0} % of the ripple that the setpoints of the position cycles cause at their \
+             beginning (100 %: current of that instant, 0 %: mean over a cycle); the standard error of the inertia includes it",
+            100.0 * share,
+            100.0 * error
+        ),
+    ));
 }
 
 /// Sets delays, gains and weights by the closed loop.
-fn apply_loop(fit: &LoopFit, found: &mut Identification) {
-    let before = found.axis.clone();
+fn apply_loop(fit: &LoopFit, before: &AxisConfig, found: &mut Identification) {
     found.axis = fit.axis.clone();
     let of = |parameter: LoopParameter| fit.values.iter().find(|value| value.parameter == parameter);
     let tsp = seconds(fit.periods.position);
@@ -246,7 +374,8 @@ fn apply_loop(fit: &LoopFit, found: &mut Identification) {
         [(LoopParameter::Beta, DelayParameter::Beta), (LoopParameter::Gamma, DelayParameter::Gamma)]
     {
         if let Some(value) = of(parameter) {
-            let half = INTERVAL * value.error;
+            // β and γ act at velocity cycles only.
+            let half = INTERVAL * value.error + 0.5 * seconds(fit.periods.velocity);
             found.delays.push(delay(which, value.value - half, value.value + half, fit));
         }
     }
@@ -258,12 +387,14 @@ fn apply_loop(fit: &LoopFit, found: &mut Identification) {
         (LoopParameter::TorqueRatio, RefinedParameter::TorqueFeedforward, inertia),
     ];
     let weight = RefinedParameter::VelocityFeedforward;
-    let changed = of(LoopParameter::Lag).filter(|_| weight.get(&before) != weight.get(&fit.axis));
+    let gain = fit.axis.position_loop.gain;
+    let gain_error = of(LoopParameter::Gain).map_or(0.0, |gain| gain.error);
+    let changed = of(LoopParameter::Lag).filter(|_| weight.get(before) != weight.get(&fit.axis));
     let changed = changed.map(|lag| RefinedValue {
         parameter: weight,
-        before: weight.get(&before),
+        before: weight.get(before),
         value: weight.get(&fit.axis),
-        error: lag.error * fit.axis.position_loop.gain,
+        error: (lag.error * gain).hypot((lag.value - (lag.value / tsp).round() * tsp) * gain_error),
         is_at_bound: false,
     });
     if let Some(value) = changed {
@@ -271,39 +402,46 @@ fn apply_loop(fit: &LoopFit, found: &mut Identification) {
             "lag-between-cycles",
             format!(
                 "the lag of {:.2} ms at constant velocity is no whole number of position cycles of {} ms: feedforward.velocity \
-                 {:.4} in place of {} represents the rest",
+                 {:.4} in place of {:.4} represents the rest",
                 of(LoopParameter::Lag).map_or(f64::NAN, |lag| lag.value / MILLISECOND),
                 Rounded(tsp / MILLISECOND),
                 value.value,
-                Rounded(value.before)
+                value.before
             ),
             "check periods.position_ms, and the weight in the machine data of the control",
         ));
     }
-    let parameters: Vec<RefinedValue> = refined
+    let parameters: Vec<(LoopParameter, RefinedValue)> = refined
         .into_iter()
         .filter_map(|(parameter, refined, scale)| {
             let value = of(parameter)?;
-            Some(RefinedValue {
+            let refined = RefinedValue {
                 parameter: refined,
-                before: refined.get(&before),
+                before: refined.get(before),
                 value: refined.get(&fit.axis),
                 error: value.error * scale,
                 is_at_bound: false,
-            })
+            };
+            Some((parameter, refined))
         })
-        .chain(changed)
+        .chain(changed.map(|changed| (LoopParameter::Lag, changed)))
         .collect();
-    let identity = |j: usize| (0..parameters.len()).map(|k| f64::from(u8::from(j == k))).collect();
+    let correlation = |a: LoopParameter, b: LoopParameter| {
+        let index = |wanted| fit.values.iter().position(|value| value.parameter == wanted);
+        index(a).zip(index(b)).and_then(|at| fit.correlations.get(at)).copied().unwrap_or(f64::NAN)
+    };
+    let row = |(a, _): &(LoopParameter, RefinedValue)| {
+        parameters.iter().map(|(b, _)| correlation(*a, *b)).collect::<Vec<f64>>()
+    };
     found.refinement = Some(Refinement {
         axis: fit.axis.clone(),
-        correlations: (0..parameters.len()).map(identity).collect(),
-        parameters,
+        correlations: parameters.iter().map(row).collect(),
+        parameters: parameters.iter().map(|(_, refined)| *refined).collect(),
         position: (fit.rms_with_given_gain.unwrap_or(fit.rms), fit.rms),
         current: None,
     });
     found.periods = Some(fit.periods);
-    report_loop(fit, &before, found);
+    report_loop(fit, before, found);
 }
 
 fn delay(delay: DelayParameter, low: f64, high: f64, fit: &LoopFit) -> DelayFit {
@@ -342,12 +480,12 @@ fn report_loop(fit: &LoopFit, before: &AxisConfig, found: &mut Identification) {
             "VFFW, TFFW, β and γ are unchanged: no recording with feedforward shows them",
         ),
     });
-    if let Some([low, high]) = fit.valley {
+    if let Some([low, high]) = fit.valley.filter(|_| found.feedforward.velocity.is_none()) {
         found.findings.push(Finding::note(
             "valley",
             format!(
                 "VFFW and α compensate each other: from VFFW {:.4} with {:.3} ms to VFFW {:.4} with {:.3} ms the residual hardly \
-                 changes; VFFW is kept at {}",
+                 changes; VFFW is set to {}",
                 low.0,
                 low.1 / MILLISECOND,
                 high.0,
@@ -358,9 +496,9 @@ fn report_loop(fit: &LoopFit, before: &AxisConfig, found: &mut Identification) {
     }
     let Some(with_given) = fit.rms_with_given_gain else { return };
     let (given, gain) = (before.position_loop.gain, fit.axis.position_loop.gain);
-    let (unit, name) = position_unit(&fit.axis);
+    let AxisUnits { error: unit, error_name: name, .. } = fit.axis.units();
     let what = format!(
-        "position_loop.gain {:.3} of the machine file leaves {:.1} {name} RMS, {:.3} leaves {:.1} {name}",
+        "position_loop.gain {:.3} of the initial machine leaves {:.1} {name} RMS, {:.3} leaves {:.1} {name}",
         given / POSITION_GAIN,
         with_given / unit,
         gain / POSITION_GAIN,
@@ -370,7 +508,7 @@ fn report_loop(fit: &LoopFit, before: &AxisConfig, found: &mut Identification) {
         Finding::warning(
             "gain-does-not-fit",
             what,
-            "compare with the servo gain in the machine data of the control; --refine without gain keeps that of the file",
+            "compare with the servo gain in the machine data of the control; --refine without gain keeps the initial one",
         )
     } else {
         Finding::note("gain-does-not-fit", what)

@@ -5,7 +5,8 @@ use std::fmt;
 use nalgebra::{DMatrix, DVector};
 use serde::{Serialize, Serializer};
 
-use super::closed_loop::{Experiment, SimulatedExperiment, simulate_all};
+use super::closed_loop::simulate_all;
+use super::experiment::{Experiment, SimulatedExperiment};
 use super::fit::{BoundedParameter, Effort, NonlinearFit, minimize};
 use super::friction::FrictionLaw;
 use virtual_axes_core::config::{AxisConfig, AxisKind, FrictionConfig, Periods};

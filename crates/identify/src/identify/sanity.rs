@@ -4,9 +4,9 @@ use super::delays::DelayParameter;
 use super::identification::Identification;
 use super::options::IdentificationInput;
 use super::validate::Agreement;
-use crate::recording::{Finding, Severity, Signals};
-use virtual_axes_core::config::{AxisConfig, AxisKind};
-use virtual_axes_core::units::{DEGREE, MILLISECOND_NS, POSITION_GAIN, RPM, Rounded};
+use crate::recording::{Finding, Severity, Signals, StatedValues};
+use virtual_axes_core::config::{AxisConfig, AxisUnits};
+use virtual_axes_core::units::{MILLISECOND_NS, POSITION_GAIN, RPM, Rounded};
 
 /// Largest factor between an identified value and that of the machine file.
 const LARGEST_FACTOR: f64 = 3.0;
@@ -16,35 +16,40 @@ const LEAST_DETERMINATION: f64 = 0.9;
 const POOR_CURRENT: &str = "poor-current";
 /// Recorded speed relative to the limit of the motor from which the transmission cannot be right.
 const FASTEST: f64 = 1.1;
-/// Position residual, m and rad, that is good enough whatever a constant lag leaves.
-const GOOD: f64 = 5e-6;
-const GOOD_ANGLE: f64 = 5e-3 * DEGREE;
+/// Position residual, µm and mdeg, that is good enough whatever a constant lag leaves.
+const GOOD: f64 = 5.0;
 
-/// Adds findings of severity invalid.
-pub(super) fn report_invalid(inputs: &[IdentificationInput<'_>], found: &mut Identification) {
+/// Adds findings of severity invalid. Results are compared with those values of the machine file that the user has stated.
+pub(super) fn report_invalid(
+    inputs: &[IdentificationInput<'_>],
+    stated: StatedValues,
+    found: &mut Identification,
+) {
     let (before, after) = (&found.initial, &found.axis);
     let milliseconds = |delay: i64| delay as f64 / MILLISECOND_NS as f64;
     let mut invalid = Vec::new();
     let changes = [
         (
+            stated.inertia,
             "motor inertia",
             before.motor.inertia,
             after.motor.inertia,
             "check torque constant, lead and units of the current",
         ),
         (
+            stated.gain,
             "position_loop.gain",
             before.position_loop.gain / POSITION_GAIN,
             after.position_loop.gain / POSITION_GAIN,
             "check the servo gain and its unit, (m/min)/mm",
         ),
     ];
-    for (name, given, value, remedy) in changes {
-        if is_far(given, value) {
+    for (is_stated, name, given, value, remedy) in changes {
+        if is_stated && is_far(given, value) {
             invalid.push(far(name, given, value, "", remedy));
         }
     }
-    for fit in &found.delays {
+    for fit in found.delays.iter().filter(|_| stated.delays) {
         let (given, value) = (milliseconds(fit.delay.of(&before.delays)), milliseconds(fit.value));
         let (name, remedy) =
             (fit.delay.name(), "check that the recorded setpoint is that at the position controller");
@@ -61,19 +66,16 @@ pub(super) fn report_invalid(inputs: &[IdentificationInput<'_>], found: &mut Ide
     }
     for (input, agreement) in inputs.iter().zip(&found.agreements) {
         invalid.extend(invalid_agreement(&input.signals.name, agreement, after));
-        invalid.extend(too_fast(input.signals, after));
+        invalid.extend(too_fast(input.signals, after).filter(|_| stated.motor_speed));
     }
     found.findings.extend(invalid);
 }
 
 /// Returns findings on an agreement that is no result: a position worse than a constant lag, or an unexplained current.
 pub fn invalid_agreement(name: &str, agreement: &Agreement, axis: &AxisConfig) -> Vec<Finding> {
-    let (good, unit, symbol) = match axis.kind() {
-        AxisKind::Linear => (GOOD, 1e-6, "µm"),
-        AxisKind::Rotary => (GOOD_ANGLE, 1e-3 * DEGREE, "mdeg"),
-    };
+    let AxisUnits { error: unit, error_name: symbol, .. } = axis.units();
     let mut invalid = Vec::new();
-    if let Some(baseline) = agreement.baseline.filter(|b| b.model > b.delayed && b.model > good) {
+    if let Some(baseline) = agreement.baseline.filter(|b| b.model > b.delayed && b.model > GOOD * unit) {
         invalid.push(Finding::invalid(
             "worse-than-lag",
             format!(
@@ -82,7 +84,7 @@ pub fn invalid_agreement(name: &str, agreement: &Agreement, axis: &AxisConfig) -
                 baseline.lag * 1e3,
                 baseline.delayed / unit
             ),
-            "check lead, gains and periods of the machine file, and the active feedforward",
+            "check lead, gains and periods of the initial machine, and the active feedforward",
         ));
     }
     let inverse = agreement.inverse.as_ref().map(|inverse| inverse.r_squared);
@@ -111,7 +113,7 @@ fn too_fast(signals: &Signals, axis: &AxisConfig) -> Option<Finding> {
         Finding::invalid(
             "too-fast",
             format!(
-                "{}: with the transmission of the machine file the motor turns at {:.0} rpm, faster than its limit of {:.0} rpm",
+                "{}: with the transmission of the initial machine the motor turns at {:.0} rpm, faster than its limit of {:.0} rpm",
                 signals.name,
                 fastest / RPM,
                 limit / RPM
@@ -130,7 +132,7 @@ fn far(name: &str, given: f64, value: f64, unit: &str, remedy: &str) -> Finding 
     Finding::invalid(
         "implausible",
         format!(
-            "{name}: {}{unit} of the machine file became {}{unit}, by more than a factor of {LARGEST_FACTOR}",
+            "{name}: {}{unit} of the initial machine became {}{unit}, by more than a factor of {LARGEST_FACTOR}",
             Rounded(given),
             Rounded(value)
         ),

@@ -1,9 +1,11 @@
 //! Position-cycle grid of recorded setpoints.
 
-use crate::recording::SignalSpan;
+use crate::recording::{SignalSpan, Signals};
 
 /// Share of the travel of PSEC on one phase above which PSEC is zero-order-held.
 const STAIRCASE: f64 = 0.9;
+/// Longest position cycle of a control, s.
+const LONGEST_CYCLE: f64 = 0.02;
 /// Tolerance of an integer ratio of two periods.
 const COMMENSURATE: f64 = 1e-4;
 
@@ -36,16 +38,39 @@ pub(super) fn stride(period: f64, tsp: f64) -> Option<usize> {
     (whole >= 1.0 && (ratio - whole).abs() < COMMENSURATE * whole).then_some(whole as usize)
 }
 
+/// Returns the longest position cycle, s, that the recorded setpoints permit, and true if it is certain: setpoints that
+/// are held for several samples show their cycle, others change at least with each sample.
+pub(super) fn longest_cycle(signals: &Signals) -> (f64, bool) {
+    let holds = |stride: usize| {
+        let mut is_moving = false;
+        let all = signals.spans.iter().filter_map(|span| span.psec.as_ref()).all(|psec| {
+            let (_, share) = held_phase(psec, stride);
+            is_moving |= share.is_some();
+            share.is_none_or(|share| share >= STAIRCASE)
+        });
+        all && is_moving
+    };
+    let most = ((LONGEST_CYCLE / signals.period) as usize).max(1);
+    let stride = (2..=most).rev().find(|stride| holds(*stride));
+    (stride.unwrap_or(1) as f64 * signals.period, stride.is_some())
+}
+
 /// Returns the sample, among the first `stride`, at which zero-order-held setpoints change; 0 without a hold. Steps count
 /// by their size, so that noise does not hide the hold.
 fn phase(psec: &[f64], stride: usize) -> usize {
+    let (phase, share) = held_phase(psec, stride);
+    if share.is_some_and(|share| share >= STAIRCASE) { phase } else { 0 }
+}
+
+/// Returns the sample, among the first `stride`, at which most of the travel happens, and its share; none without travel.
+fn held_phase(psec: &[f64], stride: usize) -> (usize, Option<f64>) {
     let mut travel = vec![0.0; stride];
     for (i, pair) in psec.windows(2).enumerate() {
         travel[(i + 1) % stride] += (pair[1] - pair[0]).abs();
     }
     let all: f64 = travel.iter().sum();
     let most = travel.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
-    most.filter(|(_, part)| **part >= STAIRCASE * all && all > 0.0).map_or(0, |(phase, _)| phase)
+    most.map_or((0, None), |(phase, part)| (phase, (all > 0.0).then(|| part / all)))
 }
 
 #[cfg(test)]
@@ -69,6 +94,26 @@ mod tests {
         let span = SignalSpan { psec: Some(psec), ..SignalSpan::default() };
         let found = SetpointGrid::of(&span, 1e-3, 6e-3).expect("a grid");
         assert!((found.first - 2e-3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_longest_cycle_is_that_of_held_setpoints_or_the_sampling_period() {
+        let signals = |psec: Vec<f64>| Signals {
+            name: String::new(),
+            period: 1e-3,
+            cutoff: 100.0,
+            trace_filter: None,
+            torque_constant: None,
+            current_lag: 0.0,
+            spans: vec![SignalSpan { psec: Some(psec), ..SignalSpan::default() }],
+        };
+        for held in [1, 2, 6] {
+            let psec = (0..600).map(|i| (f64::from((i + 4) / held * held) * 0.01).sin()).collect();
+            let (cycle, is_certain) = longest_cycle(&signals(psec));
+            assert!((cycle - 1e-3 * f64::from(held)).abs() < 1e-12, "{held}: {cycle}");
+            assert_eq!(is_certain, held > 1);
+        }
+        assert_eq!(longest_cycle(&signals(vec![0.0; 99])), (1e-3, false));
     }
 
     #[test]

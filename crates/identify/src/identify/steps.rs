@@ -2,7 +2,8 @@
 
 mod closed_loop_steps;
 
-use super::closed_loop::{Experiment, find_experiments};
+use super::closed_loop::position_residuals;
+use super::experiment::Experiment;
 use super::feedforward::{FeedforwardFit, fit_feedforward};
 use super::feedforward_mode::FeedforwardMode;
 use super::findings::{inertia_of_simulation, report_aliased_current, report_result};
@@ -10,17 +11,26 @@ use super::friction::{Breakaway, fit_friction};
 use super::gravity::{GravityCurrent, SteadyMeasurements, fit_gravity};
 use super::identification::Identification;
 use super::inertia::fit_inertia;
-use super::options::{IdentificationInput, IdentificationOptions};
+use super::options::{IdentificationInput, IdentificationOptions, RefinementScope};
 use super::presliding::fit_presliding;
-use super::production::{are_production_traces, identify_production};
+use super::production::identify_production;
 use super::refine::RefinedParameter;
+use super::route::takes_steps;
 use super::sanity::report_invalid;
 use super::segments::{MotionSegment, SegmentKind, find_segments};
+use super::setpoints::stride;
+use super::trace_experiments::trace_experiments;
 use super::transmission::fit_transmission;
 use super::validate::compute_agreement;
 use crate::recording::{Finding, Signals};
-use virtual_axes_core::config::{AxisConfig, DeviationConfig, Periods};
+use virtual_axes_core::config::{AxisConfig, AxisUnits, DeviationConfig, Periods, PositionControllerConfig};
+use virtual_axes_core::statistics::rms;
 use virtual_axes_core::units::seconds;
+
+/// Position residual of the steps, µm and mdeg RMS, from which on they are compared with a joint fit.
+const POOR: f64 = 5.0;
+/// Residual of the joint fit, relative to that of the steps, up to which it is taken.
+const MUCH_BETTER: f64 = 0.5;
 
 /// Identifies `axis` from recordings, starting from the parameters of its machine file.
 pub fn identify(
@@ -80,6 +90,12 @@ impl<'a> IdentificationSteps<'a> {
             ));
             found.deviation = as_designed;
         }
+        let torque_constant = inputs.iter().find_map(|input| input.signals.torque_constant);
+        if let Some((value, _)) = torque_constant {
+            // Both constants are those of one magnetic field.
+            found.motor.emf_constant *= value / found.motor.torque_constant;
+            found.motor.torque_constant = value;
+        }
         IdentificationSteps {
             inputs,
             periods,
@@ -102,7 +118,9 @@ impl<'a> IdentificationSteps<'a> {
                 refinement: None,
                 agreements: Vec::new(),
                 periods: None,
-                inferred_feedforward: None,
+                active_feedforward: Vec::new(),
+                torque_constant,
+                current_ripple: None,
                 findings,
             },
         }
@@ -111,21 +129,54 @@ impl<'a> IdentificationSteps<'a> {
     /// Fits the parameters of the rigid axis, with its presliding if the options ask for it.
     fn fit_axis(&mut self) {
         let (inputs, periods) = (self.inputs, self.periods);
-        if are_production_traces(inputs, &self.found.axis, periods) {
+        if !takes_steps(inputs, &self.segments, &self.found.axis, periods) {
             identify_production(inputs, periods, self.options.refine, &mut self.found);
-            let cycle = self.found.periods.unwrap_or(*periods);
-            report_aliased_current(inputs, &cycle, &mut self.found.findings);
+            if self.found.current_ripple.is_none() {
+                let cycle = self.found.periods.unwrap_or(*periods);
+                report_aliased_current(inputs, &cycle, &mut self.found.findings);
+            }
             self.find_production_experiments();
         } else {
             self.fit_plant();
             // The closed loop needs an approximate presliding only, and the presliding the inertia of the closed loop.
             self.fit_presliding(&mut Vec::new());
             self.fit_feedforward_weights();
+            let before = self.found.clone();
             self.fit_closed_loop();
+            self.compare_with_joint_fit(before);
         }
         let mut findings = Vec::new();
         self.fit_presliding(&mut findings);
         self.found.findings.append(&mut findings);
+    }
+
+    /// Takes the joint fit in place of the steps if these leave a large residual, as with wrong gains of the machine file, and
+    /// the joint fit a much smaller one.
+    fn compare_with_joint_fit(&mut self, mut joint: Identification) {
+        let AxisUnits { error: unit, error_name: name, .. } = joint.axis.units();
+        let is_cascade = joint.axis.position_loop.controller == PositionControllerConfig::Cascade;
+        let residuals = position_residuals(&self.found.axis, self.periods, &self.experiments);
+        let Some(by_steps) = residuals.and_then(|left| rms(left.iter().copied())) else { return };
+        if by_steps <= POOR * unit || !is_cascade || self.options.refine == RefinementScope::NONE {
+            return;
+        }
+        identify_production(self.inputs, self.periods, self.options.refine, &mut joint);
+        let Some(by_fit) = joint.refinement.as_ref().map(|refinement| refinement.position.1) else { return };
+        if by_fit > MUCH_BETTER * by_steps {
+            return;
+        }
+        joint.findings.push(Finding::warning(
+            "steps-disagree",
+            format!(
+                "the steps of the paper leave {:.1} {name} RMS with the gains of the initial machine, a joint fit of gains and \
+                 delays {:.1} {name}: its values are used",
+                by_steps / unit,
+                by_fit / unit
+            ),
+            "compare gains and periods with the machine data of the control",
+        ));
+        self.found = joint;
+        self.find_production_experiments();
     }
 
     /// Fits gravity, friction and inertia in two passes; the second corrects for residual accelerations with
@@ -233,10 +284,12 @@ impl<'a> IdentificationSteps<'a> {
 
     /// Prepares the comparison of the identified axis with production traces.
     fn find_production_experiments(&mut self) {
-        let (axis, periods) = (&self.found.axis, self.found.periods.unwrap_or(*self.periods));
-        let inferred = self.found.inferred_feedforward.unwrap_or(FeedforwardMode::Both);
+        let periods = self.found.periods.unwrap_or(*self.periods);
+        let ripple = self.found.ripple();
         let of = |(k, input): (usize, &IdentificationInput<'_>)| {
-            find_experiments(input.signals, k, axis, &periods, input.feedforward.unwrap_or(inferred))
+            let active = self.found.active_feedforward.get(k).copied();
+            let mode = active.or(input.feedforward).unwrap_or(FeedforwardMode::Both);
+            trace_experiments(input.signals, k, &periods, (mode, 0.0, ripple))
         };
         self.experiments = self.inputs.iter().enumerate().flat_map(of).collect();
     }
@@ -247,7 +300,9 @@ impl<'a> IdentificationSteps<'a> {
             let of_it = |e: &&Experiment| e.recording == number;
             let experiments = self.experiments.iter().filter(of_it).cloned().collect();
             let periods = self.found.periods.as_ref().unwrap_or(self.periods);
-            let found = compute_agreement(input.signals, segments, experiments, &self.found.axis, periods);
+            let is_coarse = stride(input.signals.period, seconds(periods.position)).is_none();
+            let signals = (input.signals, is_coarse || self.found.periods.is_some());
+            let found = compute_agreement(signals, segments, experiments, &self.found.axis, periods);
             // An axis that was simulated before can be simulated here.
             self.found.agreements.extend(found.ok());
         }
@@ -265,7 +320,7 @@ impl<'a> IdentificationSteps<'a> {
         let replayed = inertia_of_simulation(self.inputs, &self.found);
         self.found.replayed_inertia = replayed;
         report_result(self.inputs, seconds(self.periods.position), &mut self.found);
-        report_invalid(self.inputs, &mut self.found);
+        report_invalid(self.inputs, self.options.stated, &mut self.found);
         self.found
     }
 }

@@ -1,8 +1,9 @@
-//! Experiments from recordings that are sampled more coarsely than the position cycle.
+//! Experiments from recordings of any program at any sampling period.
 
-use super::closed_loop::Experiment;
+use super::experiment::Experiment;
 use super::feedforward_mode::FeedforwardMode;
 use super::resample::BandLimitedSpline;
+use super::setpoints::SetpointGrid;
 use crate::recording::Signals;
 use virtual_axes_core::config::Periods;
 use virtual_axes_core::units::seconds;
@@ -18,9 +19,12 @@ const SETTLING: f64 = 0.3;
 const ENDING: usize = 6;
 /// Shortest span that is simulated, s.
 const SHORTEST: f64 = 1.0;
+/// Sampling period relative to the position cycle below which the setpoints of the cycles are among the samples.
+const HELD: f64 = 0.9;
 
-/// Returns the spans of a recording as experiments with PSEC interpolated at the position cycles, `shift` s later than
-/// recorded.
+/// Returns the spans of a recording as experiments with PSEC at the position cycles, `shift` s later than recorded: the
+/// setpoints themselves, if the recording shows each of them, otherwise interpolated. `ripple` is the share of the ripple of
+/// the position cycle in the recorded current.
 ///
 /// A span can begin in motion, after a gap for instance: the simulation accelerates from rest to its first velocity, and
 /// the samples until it has settled are left out.
@@ -28,8 +32,7 @@ pub(super) fn trace_experiments(
     signals: &Signals,
     recording: usize,
     periods: &Periods,
-    mode: FeedforwardMode,
-    shift: f64,
+    (mode, shift, ripple): (FeedforwardMode, f64, f64),
 ) -> Vec<Experiment> {
     let (tsp, period) = (seconds(periods.position), signals.period);
     let skipped = (SETTLING / period).ceil() as usize;
@@ -40,9 +43,15 @@ pub(super) fn trace_experiments(
         if (span.position.len() as f64) * period < SHORTEST {
             continue;
         }
-        let spline = BandLimitedSpline::new(recorded, period);
+        // Setpoints that are held between samples are those of the position cycles.
+        let held = SetpointGrid::of(span, period, tsp).filter(|_| period < HELD * tsp);
+        let (knots, distance, origin) = match &held {
+            Some(grid) => (&grid.values, tsp, grid.first),
+            None => (recorded, period, 0.0),
+        };
+        let spline = BandLimitedSpline::new(knots, distance);
         let [start, velocity] = spline.at(0.0);
-        let end = before + (recorded.len() - 1) as f64 * period;
+        let end = before + (knots.len() - 1) as f64 * distance;
         let cycles = (end / tsp).ceil() as usize + 1;
         let setpoint = |k: usize| {
             let t = k as f64 * tsp - before - shift;
@@ -55,10 +64,12 @@ pub(super) fn trace_experiments(
             span: number,
             sample: skipped,
             mode,
+            cycle: tsp,
             psec: (0..cycles).map(setpoint).collect(),
-            first: before + skipped as f64 * period,
+            first: before - origin + skipped as f64 * period,
             period,
             trace_filter: signals.trace_filter,
+            ripple,
             start: span.start + skipped as f64 * period,
             position: of(&span.position),
             velocity: of(span.recorded_velocity.as_ref().unwrap_or(&span.velocity)),

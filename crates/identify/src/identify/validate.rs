@@ -3,15 +3,17 @@
 
 use serde::Serialize;
 
-use super::closed_loop::{Experiment, SimulatedExperiment, find_experiments, simulate_all};
+use super::closed_loop::{find_experiments, simulate_all};
+use super::experiment::{Experiment, SimulatedExperiment};
 use super::feedforward_mode::FeedforwardMode;
 use super::fit::r_squared;
-use super::friction::{friction_current, speed_unit};
+use super::friction::friction_current;
 use super::options::IdentificationInput;
 use super::plant_regression::moving_current;
 use super::resample::BandLimitedSpline;
 use super::segments::{MotionSegment, SegmentKind, find_segments};
 use super::setpoints::stride;
+use super::trace_experiments::trace_experiments;
 use crate::recording::Signals;
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::drive::Gravity;
@@ -65,6 +67,10 @@ pub struct Baseline {
     pub delayed: f64,
     /// Difference from the simulation of the model, m or rad.
     pub model: f64,
+    /// Largest difference from the delayed PSEC, m or rad.
+    pub delayed_max: f64,
+    /// Largest difference from the simulation of the model, m or rad.
+    pub model_max: f64,
 }
 
 /// Agreement of an axis model with a recording.
@@ -102,14 +108,34 @@ pub fn validate(
     axis: &AxisConfig,
     periods: &Periods,
 ) -> Result<Agreement, MachineError> {
-    let mode = input.feedforward.unwrap_or(FeedforwardMode::Both);
-    let experiments = find_experiments(input.signals, 0, axis, periods, mode);
-    compute_agreement(input.signals, find_segments(input.signals), experiments, axis, periods)
+    validate_with(input, (axis, periods), None)
 }
 
-/// Computes the agreement of an axis with the experiments of a recording.
+/// Validates as [`validate`]; `joint` is the share of the ripple of the position cycle in the recorded current, if the axis
+/// was identified by the joint fit, whose recordings can begin in motion.
+pub(super) fn validate_with(
+    input: &IdentificationInput<'_>,
+    (axis, periods): (&AxisConfig, &Periods),
+    joint: Option<f64>,
+) -> Result<Agreement, MachineError> {
+    let mode = input.feedforward.unwrap_or(FeedforwardMode::Both);
+    let on_grid = stride(input.signals.period, seconds(periods.position)).is_some();
+    let mut experiments = match on_grid && joint.is_none() {
+        true => find_experiments(input.signals, 0, axis, periods, mode),
+        false => Vec::new(),
+    };
+    if experiments.is_empty() {
+        let is_instant = input.signals.period <= seconds(periods.position);
+        let ripple = joint.unwrap_or(f64::from(u8::from(is_instant)));
+        experiments = trace_experiments(input.signals, 0, periods, (mode, 0.0, ripple));
+    }
+    let signals = (input.signals, joint.is_some() || !on_grid);
+    compute_agreement(signals, find_segments(input.signals), experiments, axis, periods)
+}
+
+/// Computes the agreement of an axis with the experiments of a recording, whose current is filtered if `is_filtered`.
 pub(super) fn compute_agreement(
-    signals: &Signals,
+    (signals, is_filtered): (&Signals, bool),
     segments: Vec<MotionSegment>,
     experiments: Vec<Experiment>,
     axis: &AxisConfig,
@@ -117,15 +143,14 @@ pub(super) fn compute_agreement(
 ) -> Result<Agreement, MachineError> {
     let simulated = simulate_all(axis, periods, &experiments)?;
     let comparisons = experiments.iter().zip(&simulated).map(|(e, s)| compare(e, s, &segments)).collect();
-    let is_coarse = stride(signals.period, seconds(periods.position)).is_none();
-    let filtered = if is_coarse { filtered_inverse_dynamics(signals, axis) } else { None };
+    let filtered = if is_filtered { filtered_inverse_dynamics(signals, axis) } else { None };
     let inverse = filtered.or_else(|| inverse_dynamics(signals, &segments, axis));
     let baseline = baseline(signals, &experiments, &simulated);
     Ok(Agreement { segments, experiments, simulated, comparisons, inverse, baseline })
 }
 
-/// Compares the filtered currents in motion, for recordings that are too coarse for a friction that changes its sign within
-/// a sample; none without motion.
+/// Compares the filtered currents in motion, for recordings with fast currents of elastic parts, or too coarse for a friction
+/// that changes its sign within a sample; none without motion.
 fn filtered_inverse_dynamics(signals: &Signals, axis: &AxisConfig) -> Option<InverseDynamics> {
     let moving = moving_current(signals, axis);
     let current = residual_statistics(moving.iter().map(|m| m.modeled - m.recorded))?;
@@ -150,11 +175,21 @@ fn baseline(
     simulated: &[SimulatedExperiment],
 ) -> Option<Baseline> {
     let pairs = experiments.iter().zip(simulated);
-    let model = rms(pairs.flat_map(|(e, s)| e.position.iter().zip(&s.position).map(|(a, b)| a - b)))?;
+    let differences =
+        || pairs.clone().flat_map(|(e, s)| e.position.iter().zip(&s.position).map(|(a, b)| a - b));
+    let largest = |differences: &mut dyn Iterator<Item = f64>| differences.map(f64::abs).fold(0.0, f64::max);
+    let model = rms(differences())?;
     let spans = || signals.spans.iter().filter_map(|span| Some((span.psec.as_ref()?, &span.position)));
     let command = rms(spans().flat_map(|(psec, position)| psec.iter().zip(position).map(|(a, b)| a - b)))?;
     let (lag, delayed) = constant_lag(signals)?;
-    Some(Baseline { command, lag, delayed, model })
+    let delayed_max = spans().map(|(psec, position)| {
+        let (spline, first) =
+            (BandLimitedSpline::new(psec, signals.period), (lag / signals.period).ceil() as usize);
+        let at = |i: usize| spline.at(i as f64 * signals.period - lag)[0] - position[i];
+        largest(&mut (first..position.len()).map(at))
+    });
+    let (delayed_max, model_max) = (delayed_max.fold(0.0, f64::max), largest(&mut differences()));
+    Some(Baseline { command, lag, delayed, model, delayed_max, model_max })
 }
 
 /// Returns the constant lag, s, with which the delayed PSEC fits the position best, and the RMS difference, m or rad;
@@ -246,7 +281,7 @@ fn inverse_dynamics(
     segments: &[MotionSegment],
     axis: &AxisConfig,
 ) -> Option<InverseDynamics> {
-    let (kt, r, unit) = (axis.motor.torque_constant, axis.transmission_ratio, speed_unit(axis));
+    let (kt, r, unit) = (axis.motor.torque_constant, axis.transmission_ratio, axis.units().speed);
     let gravity = Gravity::new(&axis.gravity, r);
     let mut modeled = Vec::new();
     let mut pairs = Vec::new();

@@ -5,7 +5,7 @@ mod transmission;
 use serde::Serialize;
 
 use super::delays::DelayParameter;
-use super::friction::{FrictionLaw, LawFit, speed_unit_name};
+use super::friction::{FrictionLaw, LawFit};
 use super::gravity::{GravityCurrent, GravitySource};
 use super::identification::Identification;
 use super::refine::{RefinedParameter, RefinedValue};
@@ -35,6 +35,9 @@ pub struct IdentifiedValue {
     pub error: Option<f64>,
     /// Interval of equivalent delays: above the first and up to the second value.
     pub interval: Option<[f64; 2]>,
+    /// True if the 95 % interval is narrower than the value.
+    #[serde(rename = "significant")]
+    pub is_significant: bool,
     /// Identification steps and equations that determine the value.
     pub source: String,
 }
@@ -97,7 +100,18 @@ impl Identification {
                 _ => f64::NAN,
             };
             let value = if interval.is_some() { value } else { rounded(value, error) };
-            out.push(IdentifiedValue { key, value, unit: definition.unit, before, error, interval, source });
+            // A value of 0 is stated as such, and an angle has no size.
+            let is_significant = interval.is_some()
+                || value == 0.0
+                || key.ends_with("phase_deg")
+                || error.is_none_or(|error| INTERVAL * error <= value.abs());
+            let source = if is_significant {
+                source
+            } else {
+                format!("{source}; not identified: interval wider than the value")
+            };
+            let unit = definition.unit;
+            out.push(IdentifiedValue { key, value, unit, before, error, interval, is_significant, source });
         };
         self.push_plant(&mut put);
         self.push_control(&mut put);
@@ -107,6 +121,18 @@ impl Identification {
 
     fn push_plant(&self, put: &mut ValueSink<'_>) {
         let axis = &self.axis;
+        if let Some((value, error)) = self.torque_constant {
+            let keys = ["motor.torque_constant_nm_a", "motor.force_constant_n_a"];
+            put(&keys, value, Some(error), None, "recorded torque and current".to_owned());
+            let keys = ["motor.emf_constant_v_s_rad", "motor.emf_constant_v_s_m"];
+            put(
+                &keys,
+                axis.motor.emf_constant,
+                None,
+                None,
+                "in proportion to the torque constant".to_owned(),
+            );
+        }
         if let Some((error, source)) =
             self.error_and_source(RefinedParameter::Inertia, self.inertia.as_ref().map(|i| i.error), || {
                 match &self.inertia {
@@ -147,7 +173,7 @@ impl Identification {
         let line = (RefinedParameter::Coulomb.get(&self.axis), RefinedParameter::Viscous.get(&self.axis));
         let what = |fit: &LawFit| match fit.law {
             FrictionLaw::Linear => {
-                let unit = speed_unit_name(&self.axis);
+                let unit = self.axis.units().speed_name;
                 format!("line {:.4} A + {:.5} A/({unit}) · V in the form of Prévost eq. 3", line.0, line.1)
             }
             FrictionLaw::DoubleExponential => format!("Prévost eq. 3, R² {:.4}", fit.r_squared),
@@ -315,7 +341,7 @@ impl Identification {
         };
         let value = periods.position as f64 / MILLISECOND_NS as f64;
         if value != before {
-            let source = "divides the lag at constant velocity".to_owned();
+            let source = "the recorded setpoints and the least residual".to_owned();
             out.push(IdentifiedValue {
                 key: key.to_owned(),
                 value,
@@ -323,6 +349,7 @@ impl Identification {
                 before,
                 error: None,
                 interval: None,
+                is_significant: true,
                 source,
             });
         }

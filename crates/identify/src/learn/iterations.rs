@@ -1,72 +1,18 @@
 //! Iterations of learning.
 
 use virtual_axes_core::config::MachineConfig;
-use virtual_axes_core::design::LearningTuning;
-use virtual_axes_core::trial::{
-    ContourFigures, Figures, GridRows, Measures, SetpointSource, Tick, Trial, TrialOutcome,
-};
+use virtual_axes_core::trial::{Figures, GridRows, Measures, SetpointSource, Tick, Trial, TrialOutcome};
 
 use super::axis::LearningAxis;
 use super::error::LearningError;
-use super::learner::Learner;
+use super::learner::{Learner, LearningIteration, LearningOptions};
 use super::setpoint_limits::SetpointExcess;
-use crate::tune::{Progress, Workload, has_contour};
+use crate::tune::{Progress, Workload};
 
 /// Largest number of iterations.
 pub const MAX_ITERATIONS: usize = 1000;
 /// Number of successive iterations with a growing largest error that ends the learning.
 const GROWTHS: usize = 2;
-
-/// Options of iterative learning.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LearningOptions {
-    /// Number of iterations after the run of the programmed setpoints.
-    pub iterations: usize,
-    /// Gain and bandwidth of the filters.
-    pub tuning: LearningTuning,
-    /// Encoder step by which measured positions are rounded before learning, m or rad; 0 is the exact position.
-    pub encoder_step: f64,
-    /// Acceleration of the compensated setpoints beyond the limit of an axis, relative to it.
-    pub acceleration_excess: f64,
-    /// Relative deviation of inertia and torque constant for which the convergence condition is computed.
-    pub deviation: f64,
-}
-
-/// Error of an axis in a run: delayed programmed setpoint − measured position at the position cycles, m or rad.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LearningAxisError {
-    /// Index in the machine.
-    pub index: usize,
-    /// Largest absolute value.
-    pub max: f64,
-    /// RMS.
-    pub rms: f64,
-    /// Largest absolute compensation of the setpoints in this run.
-    pub compensation: f64,
-}
-
-/// Run with the compensation of an iteration.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LearningIteration {
-    /// Figures of the run; their following errors are those against the compensated setpoints.
-    pub figures: Figures,
-    /// Errors of the moving axes.
-    pub axes: Vec<LearningAxisError>,
-}
-
-impl LearningIteration {
-    /// Returns the error that the learning minimizes: the largest contour error, m. Without a contour, of one axis or of
-    /// rotary axes alone, the largest error of an axis, m or rad.
-    pub fn error(&self) -> f64 {
-        let of_axes = || self.axes.iter().map(|axis| axis.max).fold(0.0, f64::max);
-        self.contour().map_or_else(of_axes, |contour| contour.max)
-    }
-
-    /// Returns the contour error of several axes, one of which is linear.
-    pub fn contour(&self) -> Option<ContourFigures> {
-        self.figures.contour.filter(|_| has_contour(&self.figures))
-    }
-}
 
 /// Reason for the end of the iterations.
 #[derive(Debug, Clone, PartialEq)]
@@ -240,7 +186,7 @@ impl Runner<'_> {
         positions.clear();
         let outcome = virtual_axes_core::trial::run_compensated(
             &trial,
-            SetpointSource::Grid(Box::new(GridRows::new(&joints, psec))),
+            SetpointSource::Grid(Box::new(GridRows::new(&joints, psec).with_rapid(self.workload.rapid()))),
             programmed,
             |tick| {
                 positions.extend(tick.machine.axes().iter().map(|axis| axis.sample().position));

@@ -1,19 +1,71 @@
 //! Errors, compensation and limits of the learning axes.
 
 use virtual_axes_core::config::{AxisConfig, MachineConfig};
+use virtual_axes_core::design::LearningTuning;
 use virtual_axes_core::statistics::rms_of_sum;
-use virtual_axes_core::trial::{Figures, TrialOutcome};
+use virtual_axes_core::trial::{ContourFigures, Figures, TrialOutcome};
 use virtual_axes_core::units::seconds;
 
 use super::axis::LearningAxis;
 use super::error::LearningError;
-use super::iterations::{LearningAxisError, LearningIteration, LearningOptions};
 use super::setpoint_limits::{SetpointExcess, first_excess};
+use crate::tune::has_contour;
 
 /// Position cycles over which the compensation fades to 0 at standstill of the programmed setpoints.
 const FADE: usize = 16;
 /// Position cycles before and after a motion without a fade, beyond the delay of the setpoints.
 const HOLD: usize = 8;
+
+/// Options of iterative learning.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LearningOptions {
+    /// Number of iterations after the run of the programmed setpoints.
+    pub iterations: usize,
+    /// Gain and bandwidth of the filters.
+    pub tuning: LearningTuning,
+    /// Encoder step by which measured positions are rounded before learning, m or rad; 0 is the exact position.
+    pub encoder_step: f64,
+    /// Acceleration of the compensated setpoints beyond the limit of an axis, relative to it.
+    pub acceleration_excess: f64,
+    /// Relative deviation of inertia and torque constant for which the convergence condition is computed.
+    pub deviation: f64,
+}
+
+/// Error of an axis in a run: delayed programmed setpoint − measured position at the position cycles, m or rad.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LearningAxisError {
+    /// Index in the machine.
+    pub index: usize,
+    /// Largest absolute value.
+    pub max: f64,
+    /// RMS.
+    pub rms: f64,
+    /// Largest absolute compensation of the setpoints in this run.
+    pub compensation: f64,
+}
+
+/// Run with the compensation of an iteration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LearningIteration {
+    /// Figures of the run; their following errors are those against the compensated setpoints.
+    pub figures: Figures,
+    /// Errors of the moving axes.
+    pub axes: Vec<LearningAxisError>,
+}
+
+impl LearningIteration {
+    /// Returns the error that the learning minimizes: the largest contour error, m. Without a contour, of one axis or of
+    /// rotary axes alone, the largest error of an axis, m or rad.
+    pub fn error(&self) -> f64 {
+        let of_axes = || self.axes.iter().map(|axis| axis.max).fold(0.0, f64::max);
+        self.contour().map_or_else(of_axes, |contour| contour.max)
+    }
+
+    /// Returns the contour error of several axes, one of which is linear.
+    pub fn contour(&self) -> Option<ContourFigures> {
+        self.figures.contour.filter(|_| has_contour(&self.figures))
+    }
+}
 
 /// Programmed setpoints and the learning axes.
 pub(super) struct Learner<'a> {

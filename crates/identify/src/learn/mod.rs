@@ -12,7 +12,6 @@ mod setpoint_limits;
 
 pub use axis::{AxisContraction, LearningAxis};
 pub use error::LearningError;
-pub use iterations::{
-    LearningAxisError, LearningEnd, LearningIteration, LearningOptions, LearningResult, MAX_ITERATIONS, learn,
-};
+pub use iterations::{LearningEnd, LearningResult, MAX_ITERATIONS, learn};
+pub use learner::{LearningAxisError, LearningIteration, LearningOptions};
 pub use setpoint_limits::{SetpointExcess, SetpointQuantity};

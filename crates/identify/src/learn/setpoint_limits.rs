@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use virtual_axes_core::config::{AxisConfig, AxisKind};
+use virtual_axes_core::config::{AxisConfig, AxisKind, AxisUnits};
 use virtual_axes_core::trajectory::JointLimits;
 use virtual_axes_core::trajectory::limits::TRAVEL_TOLERANCE;
 use virtual_axes_core::units::Rounded;
@@ -47,10 +47,7 @@ impl fmt::Display for SetpointExcess {
             SetpointQuantity::Velocity => ("velocity", "/s"),
             SetpointQuantity::Acceleration => ("acceleration", "/s²"),
         };
-        let unit = match kind {
-            AxisKind::Linear => "m",
-            AxisKind::Rotary => "rad",
-        };
+        let unit = AxisUnits::for_kind(*kind).si_name;
         let (value, limit, time) = (Rounded(*value), Rounded(*limit), Rounded(*time));
         write!(
             f,

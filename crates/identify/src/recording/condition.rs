@@ -3,17 +3,22 @@
 use super::current_lag::{self, HIGHEST_LAG, LOWEST_LAG};
 use super::filter::{GaussianFilter, MAX_CUTOFF_PERIOD, default_cutoff, deviation};
 use super::filtered_section::FilteredSection;
+use super::held_samples::without_held_samples;
 use super::ordering::{drop_copies, sort_samples};
 use super::spans::{
     CHANNELS, CURRENT, NAMES, POSITION, PSEC, channels, extract_sections, is_smoother_over_stamps,
     usable_columns,
 };
+use super::stated::StatedValues;
 use super::uniform_grid::{UniformGrid, assign_to_grid};
 use super::{ConditioningError, Finding, RawRecording, SignalSpan, Signals, plausibility};
 use crate::identify::BandLimitedSpline;
 use virtual_axes_core::config::{AxisConfig, Periods};
-use virtual_axes_core::units::{Rounded, seconds};
+use virtual_axes_core::units::{MILLISECOND, Rounded, seconds};
 
+/// Error of a recording without position.
+const NO_POSITION: &str =
+    "no position was recorded, or none of its values is a number; name its column by position=COLUMN[UNIT]";
 /// Fewest samples of a span, independent of the filter length.
 const SHORTEST_SPAN: usize = 16;
 /// Shortest permitted length of the longest span, in standard deviations of the filter.
@@ -42,6 +47,8 @@ pub struct Conditioning {
     /// Low-pass filter (second-order Butterworth, half power, Hz) of the control, which all recorded signals but PSEC
     /// have passed; simulated signals pass it too.
     pub trace_filter: Option<f64>,
+    /// Values of the axis that the user has stated, against which the recording is checked.
+    pub stated: StatedValues,
 }
 
 /// Correction of a setpoint that the recording delays.
@@ -77,12 +84,14 @@ pub fn condition(
 ) -> Result<(Signals, Vec<Finding>), ConditioningError> {
     let mut findings = Vec::new();
     check_lengths(raw)?;
+    let renewed = without_held_samples(raw, &mut findings);
+    let raw = renewed.as_ref().unwrap_or(raw);
     let mut ordered = sort_samples(raw, &mut findings)?;
     let mut columns = usable_columns(raw, &mut findings);
     drop_copies(&mut ordered, &raw.name, columns.iter().flatten(), &mut findings);
     drop_constant_current(&raw.name, &mut columns, &mut findings);
     let Some(position) = &columns[POSITION] else {
-        return Err(ConditioningError::NoPosition { name: raw.name.clone() });
+        return Err(ConditioningError::new(&raw.name, NO_POSITION));
     };
     let smoother = |placed: &UniformGrid| is_smoother_over_stamps(placed, position);
     let placed = assign_to_grid(&raw.name, &ordered, periods, smoother, &mut findings)?;
@@ -91,15 +100,21 @@ pub fn condition(
     let filter = GaussianFilter::new(cutoff, period);
     let shortest = (2 * filter.radius() + 1).max(SHORTEST_SPAN);
     let (pieces, longest) = extract_sections(&raw.name, &placed, &columns, shortest, &mut findings);
-    let nothing_left =
-        || ConditioningError::NothingLeft { name: raw.name.clone(), longest, wanted: shortest };
+    let nothing_left = || {
+        let reason = format!(
+            "the longest section without gap has {longest} samples, at least {shortest} are required; record without gaps"
+        );
+        ConditioningError::new(&raw.name, reason)
+    };
     if pieces.is_empty() {
         return Err(nothing_left());
     }
     let mut parts: Vec<FilteredSection> =
         pieces.into_iter().map(|section| FilteredSection::new(section, &filter)).collect();
     shift_psec(&raw.name, &mut parts, options.psec_shift, period, &mut findings);
-    if let Some(friction) = plausibility::check(&raw.name, &parts, axis, period, deviation(cutoff))? {
+    if let Some(friction) =
+        plausibility::check(&raw.name, &parts, (axis, options.stated), period, deviation(cutoff))?
+    {
         let what = format!(
             "{}: the current opposes the motion (friction {:.2} A in positive direction): its sign is inverted",
             raw.name, friction
@@ -119,7 +134,8 @@ pub fn condition(
     let mut spans: Vec<SignalSpan> = parts.into_iter().map(FilteredSection::into_span).collect();
     separate_spans(&mut spans, period);
     let trace_filter = select_trace_filter(&raw.name, options)?;
-    Ok((Signals { name: raw.name.clone(), period, cutoff, trace_filter, current_lag, spans }, findings))
+    let (name, torque_constant) = (raw.name.clone(), raw.torque_constant());
+    Ok((Signals { name, period, cutoff, trace_filter, torque_constant, current_lag, spans }, findings))
 }
 
 /// Moves PSEC forward in time and reports by how much.
@@ -164,16 +180,17 @@ fn check_lengths(raw: &RawRecording) -> Result<(), ConditioningError> {
     let channels = channels(raw);
     for n in 0..CHANNELS {
         let Some(values) = channels[n].filter(|values| values.len() != raw.time.len()) else { continue };
-        return Err(ConditioningError::Lengths {
-            name: raw.name.clone(),
-            channel: NAMES[n],
-            found: values.len(),
-            stamps: raw.time.len(),
-        });
+        let reason = format!(
+            "the {} has {} values for {} stamps; the file is likely truncated",
+            NAMES[n],
+            values.len(),
+            raw.time.len()
+        );
+        return Err(ConditioningError::new(&raw.name, reason));
     }
     match channels[POSITION] {
         Some(position) if position.is_empty() || position.iter().any(|x| x.is_finite()) => Ok(()),
-        _ => Err(ConditioningError::NoPosition { name: raw.name.clone() }),
+        _ => Err(ConditioningError::new(&raw.name, NO_POSITION)),
     }
 }
 
@@ -216,17 +233,21 @@ fn select_cutoff(name: &str, options: &Conditioning, placed: &UniformGrid) -> Re
     if found >= lowest && found <= highest * (1.0 + ROUNDING) {
         return Ok(found);
     }
-    Err(ConditioningError::Cutoff { name: name.to_owned(), found, lowest, highest, period })
+    let reason = format!(
+        "cut-off {} Hz, must be {lowest:.3} … {highest:.1} Hz at a sampling period of {} s",
+        Rounded(found),
+        Rounded(period)
+    );
+    Err(ConditioningError::new(name, reason))
 }
 
 fn select_trace_filter(name: &str, options: &Conditioning) -> Result<Option<f64>, ConditioningError> {
     match options.trace_filter {
-        Some(found) if !TRACE_FILTERS.contains(&found) => Err(ConditioningError::TraceFilter {
-            name: name.to_owned(),
-            found,
-            lowest: *TRACE_FILTERS.start(),
-            highest: *TRACE_FILTERS.end(),
-        }),
+        Some(found) if !TRACE_FILTERS.contains(&found) => {
+            let (lowest, highest) = (TRACE_FILTERS.start(), TRACE_FILTERS.end());
+            let reason = format!("trace filter {} Hz, must lie in {lowest} … {highest} Hz", Rounded(found));
+            Err(ConditioningError::new(name, reason))
+        }
         given => Ok(given),
     }
 }
@@ -244,8 +265,10 @@ fn select_current_lag(
     const CODE: &str = "current-lag";
     if let Some(found) = options.current_lag {
         if !(LOWEST_LAG..=HIGHEST_LAG).contains(&found) {
-            let (lowest, highest) = (LOWEST_LAG, HIGHEST_LAG);
-            return Err(ConditioningError::Lag { name: name.to_owned(), found, lowest, highest });
+            let [found, lowest, highest] =
+                [found, LOWEST_LAG, HIGHEST_LAG].map(|lag| Rounded(lag / MILLISECOND));
+            let reason = format!("--current-lag-ms is {found}, must be {lowest} … {highest}");
+            return Err(ConditioningError::new(name, reason));
         }
         return Ok(found);
     }

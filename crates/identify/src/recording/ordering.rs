@@ -2,6 +2,7 @@
 
 use super::{ConditioningError, Finding, RawRecording};
 use virtual_axes_core::statistics::median;
+use virtual_axes_core::units::Rounded;
 
 /// Fewest samples of a recording: 0.2 s at 6 ms.
 const FEWEST: usize = 32;
@@ -30,15 +31,22 @@ pub(super) fn sort_samples(
     raw: &RawRecording,
     findings: &mut Vec<Finding>,
 ) -> Result<OrderedSamples, ConditioningError> {
-    let name = || raw.name.clone();
-    let too_few = |found| ConditioningError::TooFew { name: name(), found, wanted: FEWEST };
+    let error = |reason: String| ConditioningError::new(&raw.name, reason);
+    let too_few = |found: usize| {
+        error(format!(
+            "{found} samples, at least {FEWEST} are required; the file is likely empty or truncated"
+        ))
+    };
     if raw.time.len() < FEWEST {
         return Err(too_few(raw.time.len()));
     }
     let rows: Vec<usize> = (0..raw.time.len()).filter(|&row| raw.time[row].is_finite()).collect();
     let bad = raw.time.len() - rows.len();
     if 2 * bad > raw.time.len() {
-        return Err(ConditioningError::StampsNotFinite { name: name(), bad, stamps: raw.time.len() });
+        return Err(error(format!(
+            "{bad} of {} stamps are not finite; check the time column",
+            raw.time.len()
+        )));
     }
     if rows.len() < FEWEST {
         return Err(too_few(rows.len()));
@@ -49,11 +57,14 @@ pub(super) fn sort_samples(
     }
     let stamps: Vec<f64> = rows.iter().map(|&row| raw.time[row]).collect();
     if stamps.iter().all(|&stamp| stamp == stamps[0]) {
-        return Err(ConditioningError::StampsEqual { name: name(), stamp: stamps[0] });
+        return Err(error(format!("every stamp is {} s; check the time column", Rounded(stamps[0]))));
     }
     let back = stamps.windows(2).filter(|pair| pair[1] < pair[0]).count();
     if 2 * back > stamps.len() {
-        return Err(ConditioningError::StampsBackwards { name: name(), back, stamps: stamps.len() });
+        let count = stamps.len();
+        return Err(error(format!(
+            "{back} of {count} stamps are earlier than the one before; check the time column"
+        )));
     }
     let mut ordered = OrderedSamples { rows, stamps };
     if back > 0 {

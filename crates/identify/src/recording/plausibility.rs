@@ -5,18 +5,25 @@
 
 mod current;
 
-use super::ConditioningError;
 use super::filtered_section::FilteredSection;
 use super::regression::{LeastSquares, correlation};
 use super::spans::{CURRENT, POSITION, PSEC, VELOCITY};
-use virtual_axes_core::config::{AxisConfig, AxisKind};
+use super::{ConditioningError, StatedValues};
+use virtual_axes_core::config::{AxisConfig, AxisKind, AxisUnits};
 use virtual_axes_core::statistics::{median, quantile};
-use virtual_axes_core::units::{DEGREE, MILLIMETER, MINUTE, RPM};
+use virtual_axes_core::units::{DEGREE, MILLIMETER, MINUTE, RPM, Rounded};
 
 /// Largest permitted travel relative to the travel limits; the machine file can describe a smaller machine.
 const MAX_TRAVEL: f64 = 3.0;
 /// Largest permitted speed relative to Vmax.
 const SPEEDS: f64 = 10.0;
+/// Largest travel of linear axes, m, and speed of linear and rotary axes, m/s and rad/s, of machine tools: limits where the
+/// user has stated none.
+const LONGEST: f64 = 20.0;
+const FASTEST_LINEAR: f64 = 4.0;
+const FASTEST_ROTARY: f64 = 25.0;
+/// Smallest gain of a position loop, s⁻¹.
+const LEAST_GAIN: f64 = 5.0;
 /// Smallest travel of a moving axis, in standard deviations of the filter times its top speed; noise stays
 /// below.
 const MOTION: f64 = 20.0;
@@ -33,12 +40,12 @@ const NEAR: f64 = 0.04;
 /// Lag of PSEC, s, above which PSEC and position are swapped; at least two samples.
 const BEHIND: f64 = 5e-3;
 
-/// Rejects a recording that is not plausible for `axis`. `deviation` is the standard deviation of the filter,
+/// Rejects a recording that is not plausible for an axis with its stated values. `deviation` is the standard deviation of the filter,
 /// s. Returns the friction current, A, if the sign of the current is inverted.
 pub(super) fn check(
     name: &str,
     parts: &[FilteredSection],
-    axis: &AxisConfig,
+    axis: (&AxisConfig, StatedValues),
     period: f64,
     deviation: f64,
 ) -> Result<Option<f64>, ConditioningError> {
@@ -67,6 +74,7 @@ pub(super) fn check(
 struct PlausibilityCheck<'a> {
     name: &'a str,
     axis: &'a AxisConfig,
+    stated: StatedValues,
     columns: [Option<Vec<f64>>; 4],
     velocity: Vec<f64>,
     /// Filtered recorded velocity and its derivative.
@@ -77,7 +85,12 @@ struct PlausibilityCheck<'a> {
 }
 
 impl<'a> PlausibilityCheck<'a> {
-    fn new(name: &'a str, parts: &[FilteredSection], axis: &'a AxisConfig, deviation: f64) -> Self {
+    fn new(
+        name: &'a str,
+        parts: &[FilteredSection],
+        (axis, stated): (&'a AxisConfig, StatedValues),
+        deviation: f64,
+    ) -> Self {
         let joined = |of: &dyn Fn(&FilteredSection) -> Option<Vec<f64>>| -> Option<Vec<f64>> {
             parts.iter().map(of).collect::<Option<Vec<_>>>().map(|all| all.concat())
         };
@@ -94,6 +107,7 @@ impl<'a> PlausibilityCheck<'a> {
         PlausibilityCheck {
             name,
             axis,
+            stated,
             columns,
             velocity,
             recorded,
@@ -103,23 +117,18 @@ impl<'a> PlausibilityCheck<'a> {
         }
     }
 
-    fn name(&self) -> String {
-        self.name.to_owned()
+    fn error(&self, reason: String, cause: &str) -> Result<(), ConditioningError> {
+        Err(ConditioningError::new(self.name, reason).with_cause(cause))
     }
 
     fn unit(&self) -> &'static str {
-        match self.axis.kind {
-            AxisKind::Linear => "m",
-            AxisKind::Rotary => "rad",
-        }
+        self.axis.units().si_name
     }
 
     /// Returns the unit whose numbers are too large if they are read in the SI unit.
     fn large_unit(&self) -> (&'static str, f64) {
-        match self.axis.kind {
-            AxisKind::Linear => ("mm", MILLIMETER),
-            AxisKind::Rotary => ("deg", DEGREE),
-        }
+        let AxisUnits { length, length_key, .. } = self.axis.units();
+        (length_key, length)
     }
 
     fn column(&self, channel: usize) -> &[f64] {
@@ -160,47 +169,69 @@ impl<'a> PlausibilityCheck<'a> {
         if together.abs() >= TOGETHER {
             return Ok(());
         }
-        let looks_like = looks_like.to_owned();
-        Err(ConditioningError::VelocityUnrelated { name: self.name(), correlation: together, looks_like })
+        let reason = format!(
+            "the velocity does not correlate with the derivative of the position (correlation {together:.2})"
+        );
+        self.error(reason, looks_like)
+    }
+
+    /// Returns travel limits, m or rad, and the travel from which a recording is rejected.
+    fn travel_limit(&self) -> (f64, f64) {
+        let limits = &self.axis.limits;
+        let range = limits.travel_max - limits.travel_min;
+        match (self.stated.travel, self.axis.kind) {
+            (true, _) => (range, MAX_TRAVEL * range),
+            (false, AxisKind::Linear) => (LONGEST, LONGEST),
+            (false, AxisKind::Rotary) => (f64::INFINITY, f64::MAX),
+        }
+    }
+
+    /// Returns the speed limit, m/s or rad/s, and the speed from which a recording is rejected.
+    fn speed_limit(&self) -> (f64, f64) {
+        let limit = self.axis.limits.velocity;
+        match (self.stated.velocity, self.axis.kind) {
+            (true, _) => (limit, SPEEDS * limit),
+            (false, AxisKind::Linear) => (FASTEST_LINEAR, FASTEST_LINEAR),
+            (false, AxisKind::Rotary) => (FASTEST_ROTARY, FASTEST_ROTARY),
+        }
     }
 
     fn check_travel(&self) -> Result<(), ConditioningError> {
-        let limits = &self.axis.limits;
-        let range = limits.travel_max - limits.travel_min;
+        let (range, allowed) = self.travel_limit();
         for (channel, what) in [(POSITION, "position"), (PSEC, "PSEC")] {
             let Some(values) = self.columns[channel].as_deref() else { continue };
             let travel = travel(values);
             // A NaN fails this comparison and is rejected.
-            if travel <= MAX_TRAVEL * range {
+            if travel <= allowed {
                 continue;
             }
             let (large, size) = self.large_unit();
-            let fits = travel * size <= MAX_TRAVEL * range;
+            let fits = travel * size <= allowed;
             let key = if channel == POSITION { "position" } else { "psec" };
             let looks_like = if fits {
                 format!("it is likely in {large}; give --column {key}=COLUMN[{large}]")
             } else {
                 String::new()
             };
-            return Err(ConditioningError::BeyondTravelLimits {
-                name: self.name(),
-                channel: what,
-                travel,
-                range,
-                unit: self.unit(),
-                looks_like,
-            });
+            let (unit, travel, range) = (self.unit(), Rounded(travel), Rounded(range));
+            let limit = if self.stated.travel {
+                "the travel limits of the axis"
+            } else {
+                "that of a machine tool at most"
+            };
+            let reason = format!("the {what} covers {travel} {unit}, {limit} {range} {unit}");
+            return self.error(reason, &looks_like);
         }
         Ok(())
     }
 
     fn check_speed(&self) -> Result<(), ConditioningError> {
-        let limit = self.axis.limits.velocity;
-        if self.top_speed <= SPEEDS * limit {
+        let (limit, allowed) = self.speed_limit();
+        if self.top_speed <= allowed {
             return Ok(());
         }
         let (large, size) = self.large_unit();
-        let looks_like = if self.top_speed * size > SPEEDS * limit {
+        let looks_like = if self.top_speed * size > allowed {
             String::new()
         } else if self.velocity_relation().is_some_and(|(factor, _)| UNITY.contains(&factor)) {
             format!(
@@ -211,13 +242,14 @@ impl<'a> PlausibilityCheck<'a> {
                 "the position is likely in {large}; give --column position=COLUMN[{large}], or time=COLUMN[s] if the time is in s"
             )
         };
-        Err(ConditioningError::TooFast {
-            name: self.name(),
-            velocity: self.top_speed,
-            limit,
-            unit: self.unit(),
-            looks_like,
-        })
+        let (unit, speed, limit) = (self.unit(), Rounded(self.top_speed), Rounded(limit));
+        let of = if self.stated.velocity {
+            "the limit of the axis is"
+        } else {
+            "that of a machine tool at most at"
+        };
+        let reason = format!("the position changes at {speed} {unit}/s, {of} {limit} {unit}/s");
+        self.error(reason, &looks_like)
     }
 
     fn check_velocity_scale(&self) -> Result<(), ConditioningError> {
@@ -257,7 +289,8 @@ impl<'a> PlausibilityCheck<'a> {
             looks_like += if looks_like.is_empty() { "" } else { "; " };
             looks_like += "its sign is inverted; give the unit with -1";
         }
-        Err(ConditioningError::VelocityScale { name: self.name(), factor, looks_like })
+        let reason = format!("the velocity is {} times the derivative of the position", Rounded(factor));
+        self.error(reason, &looks_like)
     }
 
     fn check_psec_scale(&self) -> Result<(), ConditioningError> {
@@ -266,7 +299,8 @@ impl<'a> PlausibilityCheck<'a> {
         let together = correlation(psec, position);
         // A NaN is rejected.
         if together.is_nan() || together.abs() < TOGETHER {
-            return Err(ConditioningError::PsecUnrelated { name: self.name(), correlation: together });
+            let reason = format!("the position does not correlate with PSEC (correlation {together:.2})");
+            return self.error(reason, "the columns are likely swapped or of another axis");
         }
         let factor = spread(psec) / spread(position) * together.signum();
         if UNITY.contains(&factor) {
@@ -288,11 +322,8 @@ impl<'a> PlausibilityCheck<'a> {
                 "the position is likely the angle of the motor; record that of the axis".to_owned(),
             ),
         ];
-        Err(ConditioningError::PsecScale {
-            name: self.name(),
-            factor,
-            looks_like: closest_cause(factor, known),
-        })
+        let reason = format!("PSEC is {} times the position", Rounded(factor));
+        self.error(reason, &closest_cause(factor, known))
     }
 
     fn check_psec_offset(&self) -> Result<(), ConditioningError> {
@@ -302,11 +333,16 @@ impl<'a> PlausibilityCheck<'a> {
         let mut distances: Vec<f64> =
             (0..position.len()).filter(rests).map(|n| (psec[n] - position[n]).abs()).collect();
         let distance = median(&mut distances).unwrap_or(0.0);
-        let allowed = self.axis.limits.velocity / self.axis.position_loop.gain;
+        let gain = if self.stated.gain { self.axis.position_loop.gain } else { LEAST_GAIN };
+        let allowed = self.speed_limit().0 / gain;
         if distance <= allowed {
             return Ok(());
         }
-        Err(ConditioningError::PsecApart { name: self.name(), distance, allowed, unit: self.unit() })
+        let (unit, distance, allowed) = (self.unit(), Rounded(distance), Rounded(allowed));
+        let reason = format!(
+            "at rest PSEC and position differ by {distance} {unit}, more than the largest following error {allowed} {unit}"
+        );
+        self.error(reason, "record both with the same zero")
     }
 
     /// Rejects a PSEC that lags behind the position: the following error divided by the velocity must not be
@@ -317,7 +353,11 @@ impl<'a> PlausibilityCheck<'a> {
         if lead >= -BEHIND.max(2.0 * period) {
             return Ok(());
         }
-        Err(ConditioningError::PsecBehind { name: self.name(), lag: -lead })
+        let reason = format!(
+            "PSEC lags behind the position by {} ms: the recording delays the setpoint, or the two columns are swapped",
+            Rounded(-lead * 1e3)
+        );
+        self.error(reason, "--psec-shift auto moves PSEC by this lag, --psec-shift MS by a known one")
     }
 }
 

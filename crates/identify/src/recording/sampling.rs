@@ -3,7 +3,7 @@
 use super::ConditioningError;
 use virtual_axes_core::config::Periods;
 use virtual_axes_core::statistics::{median, quantile};
-use virtual_axes_core::units::seconds;
+use virtual_axes_core::units::{Rounded, seconds};
 
 /// Longest sampling period, s: ten samples within the shortest acceleration of 0.5 s.
 const LONGEST_PERIOD: f64 = 0.05;
@@ -17,7 +17,7 @@ const MOSTLY: f64 = 0.6;
 /// Rejects a sampling period that is not plausible for a drive.
 ///
 /// # Errors
-/// [`ConditioningError::TimeUnit`] with the likely time unit.
+/// [`ConditioningError`] with the likely time unit.
 pub(super) fn check_period(name: &str, period: f64, periods: &Periods) -> Result<(), ConditioningError> {
     let shortest = SHORTEST_PERIOD * seconds(periods.current);
     if period >= shortest && period <= LONGEST_PERIOD {
@@ -35,14 +35,13 @@ pub(super) fn check_period(name: &str, period: f64, periods: &Periods) -> Result
     } else {
         ""
     };
-    let looks_like = looks_like.to_owned();
-    Err(ConditioningError::TimeUnit {
-        name: name.to_owned(),
-        period,
-        shortest,
-        longest: LONGEST_PERIOD,
-        looks_like,
-    })
+    let reason = format!(
+        "sampling period {} s, must be {} … {} s",
+        Rounded(period),
+        Rounded(shortest),
+        Rounded(LONGEST_PERIOD)
+    );
+    Err(ConditioningError::new(name, reason).with_cause(looks_like))
 }
 
 /// Returns a first estimate of the sampling period, s.

@@ -38,6 +38,8 @@ const MAX_ROUNDING_SHIFT: f64 = 0.02;
 const MIN_REPORTED_JITTER: f64 = 0.01;
 /// Median distance from the grid, in periods, above which the sampling is irregular.
 const MAX_MEDIAN_DEVIATION: f64 = 0.5;
+/// Step of the distance from the grid between samples, relative to the distance, below which stamps wander.
+const SMALL_STEPS: f64 = 0.35;
 /// Share of long intervals without a burst above which the sampling is irregular.
 const MAX_GAP_SHARE: f64 = 0.25;
 
@@ -83,7 +85,7 @@ struct Slots {
 /// at their stamps instead.
 ///
 /// # Errors
-/// [`ConditioningError::TimeUnit`] if the sampling period is not plausible for a drive.
+/// [`ConditioningError`] if the sampling period is not plausible for a drive.
 pub(super) fn assign_to_grid(
     name: &str,
     ordered: &OrderedSamples,
@@ -114,7 +116,8 @@ pub(super) fn assign_to_grid(
     let wandering = median(&mut distance.iter().map(|d| d.abs()).collect::<Vec<_>>()).unwrap_or(0.0);
     let uncaught = slots.gaps as f64 > MAX_GAP_SHARE * intervals.len() as f64;
     let smoother = || !coarse && stamped_smoother(&placed);
-    if wandering > MAX_MEDIAN_DEVIATION + step / placed.period || uncaught || smoother() {
+    let walks = || !coarse && slots.stalls.is_empty() && slots.dropped == 0 && is_walk(&distance);
+    if walks() || wandering > MAX_MEDIAN_DEVIATION + step / placed.period || uncaught || smoother() {
         placed = keep_stamps(ordered, placed.period.max(step));
         let spread = |at| quantile(&mut intervals.clone(), at).unwrap_or(0.0) * 1e3;
         let what = format!(
@@ -128,6 +131,14 @@ pub(super) fn assign_to_grid(
     }
     report_grid(name, &slots, &distance, placed.period, findings);
     Ok(placed)
+}
+
+/// Returns true if the distances of the stamps from the grid, in periods, wander by more than half a period in small steps:
+/// the stamps are right, and the logger does not sample uniformly. Jitter of the stamps changes from sample to sample.
+fn is_walk(distance: &[f64]) -> bool {
+    let largest = distance.iter().fold(0.0_f64, |most, d| most.max(d.abs()));
+    let steps = rms(distance.windows(2).map(|pair| pair[1] - pair[0])).unwrap_or(0.0);
+    largest > MAX_MEDIAN_DEVIATION && steps < SMALL_STEPS * rms(distance.iter().copied()).unwrap_or(0.0)
 }
 
 fn report_grid(name: &str, slots: &Slots, distance: &[f64], period: f64, findings: &mut Vec<Finding>) {

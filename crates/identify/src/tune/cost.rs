@@ -3,21 +3,16 @@
 use std::fmt;
 use std::str::FromStr;
 
-use virtual_axes_core::config::{AxisKind, MachineConfig};
+use virtual_axes_core::config::{AxisKind, AxisUnits, MachineConfig};
 use virtual_axes_core::trial::{AxisFigures, Figures};
-use virtual_axes_core::units::{DEGREE, MILLIMETER, Rounded};
-
-/// Micrometer in m.
-const MICROMETER: f64 = 1e-3 * MILLIMETER;
-/// Millidegree in rad.
-const MILLIDEGREE: f64 = 1e-3 * DEGREE;
+use virtual_axes_core::units::{MICROMETER, Rounded};
 
 /// Figure of a run that can be part of a cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CostTerm {
-    /// Largest contour error, µm; without contour error the same as [`CostTerm::Following`].
+    /// Largest contour error of the motions at feed, µm; without contour error the same as [`CostTerm::Following`].
     Contour,
-    /// RMS contour error, µm; without contour error the same as [`CostTerm::FollowingRms`].
+    /// RMS contour error of the motions at feed, µm; without contour error the same as [`CostTerm::FollowingRms`].
     ContourRms,
     /// Largest delay-compensated following error of any axis, µm or mdeg.
     Following,
@@ -72,10 +67,7 @@ impl CostTerm {
         let worst = |value: &dyn Fn(&AxisFigures) -> f64| {
             figures.axes.iter().filter(|axis| axis.moves).map(value).fold(0.0, f64::max)
         };
-        let unit = |axis: &AxisFigures| match axis.kind {
-            AxisKind::Linear => MICROMETER,
-            AxisKind::Rotary => MILLIDEGREE,
-        };
+        let unit = |axis: &AxisFigures| AxisUnits::for_kind(axis.kind).error;
         match (self, figures.contour.filter(|_| has_contour(figures))) {
             (CostTerm::Contour, Some(contour)) => contour.max / MICROMETER,
             (CostTerm::ContourRms, Some(contour)) => contour.rms / MICROMETER,

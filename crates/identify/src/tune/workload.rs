@@ -22,8 +22,8 @@ pub struct Workload {
 
 #[derive(Debug, Clone)]
 enum Content {
-    /// PSEC of `joints`, row by row for each position cycle.
-    Rows { joints: Vec<usize>, rows: Vec<f64> },
+    /// PSEC of `joints`, row by row for each position cycle, and true for each row that is reached at rapid traverse.
+    Rows { joints: Vec<usize>, rows: Vec<f64>, rapid: Vec<bool> },
     /// Trajectories with arrival times, ns.
     Requests(Vec<(Nanoseconds, TrajectoryRequest)>),
 }
@@ -43,12 +43,13 @@ impl Workload {
             SetpointSource::Grid(mut source) => {
                 let joints = source.joints().to_vec();
                 let mut row = vec![0.0; joints.len()];
-                let mut rows = Vec::new();
+                let (mut rows, mut rapid) = (Vec::new(), Vec::new());
                 while source.next(&mut row)? {
                     go_on()?;
                     rows.extend_from_slice(&row);
+                    rapid.push(source.is_rapid());
                 }
-                Content::Rows { joints, rows }
+                Content::Rows { joints, rows, rapid }
             }
             SetpointSource::Requests(requests) => Content::Requests(requests.collect::<Result<_, _>>()?),
         };
@@ -63,6 +64,14 @@ impl Workload {
     /// Returns the path, if known.
     pub fn program(&self) -> Option<&Arc<Program>> {
         self.program.as_ref()
+    }
+
+    /// Returns true for each row of setpoints that is reached at rapid traverse; empty for trajectories.
+    pub fn rapid(&self) -> &[bool] {
+        match &self.content {
+            Content::Rows { rapid, .. } => rapid,
+            Content::Requests(_) => &[],
+        }
     }
 
     /// Runs the workload on `machine` with [`trial::run`].
@@ -103,7 +112,9 @@ impl Workload {
 
     fn setpoints(&self) -> SetpointSource<'_> {
         match &self.content {
-            Content::Rows { joints, rows } => SetpointSource::Grid(Box::new(GridRows::new(joints, rows))),
+            Content::Rows { joints, rows, rapid } => {
+                SetpointSource::Grid(Box::new(GridRows::new(joints, rows).with_rapid(rapid)))
+            }
             Content::Requests(requests) => {
                 SetpointSource::Requests(Box::new(requests.iter().map(|request| Ok(request.clone()))))
             }

@@ -17,7 +17,10 @@ const AXES: [&str; 5] = ["x", "y", "z", "a", "c"];
 const TOLERANCE: f64 = 1e-6;
 
 fn shipped(machine: &str) -> MachineConfig {
-    Parameters::builtin(machine).expect("shipped").machine_config().expect("valid")
+    Parameters::load(machine, virtual_axes_builtin::MACHINES)
+        .expect("shipped")
+        .machine_config()
+        .expect("valid")
 }
 
 fn plan(
@@ -342,7 +345,7 @@ fn a_rotary_axis_sweeps_its_range_or_a_full_turn_at_two_speeds() {
 
 #[test]
 fn parts_set_the_feedforward_of_their_name() {
-    let parameters = Parameters::builtin("mikron_ucp710").expect("shipped");
+    let parameters = Parameters::load("mikron_ucp710", virtual_axes_builtin::MACHINES).expect("shipped");
     let assigned = |part: FeedforwardMode| -> Vec<String> {
         let list = part.assignments(&parameters, "x");
         list.iter().map(|assignment| format!("{}={}", assignment.key, assignment.value)).collect()
@@ -370,7 +373,7 @@ fn friction_of_x(velocity: f64) -> f64 {
 
 #[test]
 fn legs_of_the_long_part_settle_at_twelve_speeds_in_both_directions() {
-    let parameters = Parameters::builtin("mikron_ucp710").expect("shipped");
+    let parameters = Parameters::load("mikron_ucp710", virtual_axes_builtin::MACHINES).expect("shipped");
     let machine = machine_with_feedforward(&parameters, "x", FeedforwardMode::Off);
     let campaign = plan(&machine, "x", &[FeedforwardMode::Off], &CampaignOptions::default());
     let recording = record(&machine, "x", campaign.psec(), &Disturbance::default());

@@ -36,13 +36,12 @@ fn has(found: &Identification, code: &str) -> bool {
 }
 
 #[test]
-fn samples_beside_the_position_cycles_are_reported() {
+fn samples_beside_the_position_cycles_take_the_joint_fit() {
     let found =
         identified(&[beside(&sampled(16))], &initial_parameters("x"), &IdentificationOptions::default());
-    let text = finding(&found, Severity::Warning, "sampling-phase");
-    let (_, time) = text.split_once("as if it were sampled ").expect("the time");
-    let (time, _) = time.split_once(" ms after the position cycles").expect("the side");
-    assert!((time.parse::<f64>().expect("a number") - 2.0).abs() < 0.02, "{text}");
+    finding(&found, Severity::Warning, "steps-disagree");
+    let model = found.agreements[0].baseline.expect("a simulation").model;
+    assert!(model < 5e-6, "{model} m");
     let found = identified(&[sampled(48)], &initial_parameters("x"), &IdentificationOptions::default());
     assert!(!has(&found, "sampling-phase"), "{:?}", found.findings);
 }
@@ -95,7 +94,7 @@ fn the_gravity_that_a_production_trace_keeps_is_reported() {
     assert!(found.inertia.is_some());
     let text = finding(&found, Severity::Note, "gravity-kept");
     assert!(
-        text.contains("gravity.tilt_nm 0 and gravity.tilt_phase_deg 0 are those of the machine file"),
+        text.contains("gravity.tilt_nm 0 and gravity.tilt_phase_deg 0 are those of the initial machine"),
         "{text}"
     );
 }

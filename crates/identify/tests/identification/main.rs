@@ -8,5 +8,6 @@ mod identify_recordings;
 mod identify_round_trip;
 mod identify_sampling;
 mod identify_transmission;
+mod random_transmissions;
 mod recording_conditioning;
 mod recording_conditioning_drive;

@@ -3,7 +3,7 @@
 use byteorder::{BigEndian, LittleEndian};
 use cdr_encoding::CdrDeserializer;
 use serde::Serialize;
-use serde::de::DeserializeSeed;
+use serde::de::DeserializeOwned;
 
 /// Encapsulation header of little-endian CDR, options 0.
 const CDR_LE: [u8; 4] = [0, 1, 0, 0];
@@ -20,17 +20,17 @@ pub fn encode_cdr(message: &impl Serialize, bytes: &mut Vec<u8>) -> Result<(), c
     cdr_encoding::to_writer::<_, LittleEndian, _>(bytes, message)
 }
 
-/// Deserializes a CDR message of either byte order with `seed`.
+/// Deserializes a CDR message of either byte order.
 ///
 /// # Errors
 /// Returns the reason if the bytes are not plain CDR or not a message of this type.
-pub(super) fn decode<'de, S: DeserializeSeed<'de>>(seed: S, bytes: &'de [u8]) -> Result<S::Value, String> {
+pub(super) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
     let Some((header, body)) = bytes.split_first_chunk::<4>() else {
         return Err(format!("the message has {} bytes, CDR needs at least 4", bytes.len()));
     };
     let decoded = match [header[0], header[1]] {
-        CDR_BE => seed.deserialize(&mut CdrDeserializer::<BigEndian>::new(body)),
-        order if order == CDR_LE[..2] => seed.deserialize(&mut CdrDeserializer::<LittleEndian>::new(body)),
+        CDR_BE => T::deserialize(&mut CdrDeserializer::<BigEndian>::new(body)),
+        order if order == CDR_LE[..2] => T::deserialize(&mut CdrDeserializer::<LittleEndian>::new(body)),
         [a, b] => {
             return Err(format!(
                 "the CDR encoding is {a:#04x} {b:#04x}, must be plain CDR, 0x00 0x00 (big-endian) or \
@@ -43,8 +43,6 @@ pub(super) fn decode<'de, S: DeserializeSeed<'de>>(seed: S, bytes: &'de [u8]) ->
 
 #[cfg(test)]
 mod tests {
-    use std::marker::PhantomData;
-
     use super::*;
     use crate::messages::builtin_interfaces::msg::Time;
 
@@ -53,8 +51,8 @@ mod tests {
         let little = [0, 1, 0, 0, 1, 0, 0, 0, 2, 1, 0, 0];
         let big = [0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 1, 2];
         let time = Time { sec: 1, nanosec: 258 };
-        assert_eq!(decode(PhantomData::<Time>, &little), Ok(time.clone()));
-        assert_eq!(decode(PhantomData::<Time>, &big), Ok(time.clone()));
+        assert_eq!(decode(&little), Ok(time.clone()));
+        assert_eq!(decode(&big), Ok(time.clone()));
         let mut bytes = vec![9; 3];
         encode_cdr(&time, &mut bytes).expect("a message");
         assert_eq!(bytes, little);
@@ -62,9 +60,9 @@ mod tests {
 
     #[test]
     fn encodings_other_than_plain_cdr_are_rejected() {
-        let error = decode(PhantomData::<Time>, &[0, 7, 0, 0, 1, 0, 0, 0]).expect_err("XCDR2");
+        let error = decode::<Time>(&[0, 7, 0, 0, 1, 0, 0, 0]).expect_err("XCDR2");
         assert!(error.contains("0x00 0x07") && error.contains("plain CDR"), "{error}");
-        assert!(decode(PhantomData::<Time>, &[0, 1, 0]).expect_err("short").contains("3 bytes"));
-        assert!(decode(PhantomData::<Time>, &[0, 1, 0, 0, 1]).is_err());
+        assert!(decode::<Time>(&[0, 1, 0]).expect_err("short").contains("3 bytes"));
+        assert!(decode::<Time>(&[0, 1, 0, 0, 1]).is_err());
     }
 }

@@ -3,7 +3,7 @@
 //! Keys contain units; the unit of an axis's errors is in its `unit`: um or mdeg.
 
 use serde_json::{Map, Value, json};
-use virtual_axes_core::config::AxisKind;
+use virtual_axes_core::config::AxisUnits;
 use virtual_axes_core::trial::{
     AxisFigures, BidirectionalFigures, CircleFigures, CornerFigures, Figures, Reference,
 };
@@ -42,14 +42,12 @@ pub fn part_program_json(figures: &ProgramFigures) -> Value {
         "cycle_time_s": figures.cycle_time,
         "programmed_time_s": figures.programmed_time,
         "worst_lines": figures.worst_lines.iter().map(line).collect::<Vec<_>>(),
+        "worst_rapids": figures.worst_rapids.iter().map(line).collect::<Vec<_>>(),
     })
 }
 
 fn axis(axis: &AxisFigures) -> Value {
-    let (unit, scale) = match axis.kind {
-        AxisKind::Linear => ("um", MICROMETER),
-        AxisKind::Rotary => ("mdeg", MILLIDEGREE),
-    };
+    let AxisUnits { error: scale, error_key: unit, .. } = AxisUnits::for_kind(axis.kind);
     let report = &axis.report;
     json!({
         "unit": unit,
@@ -81,6 +79,9 @@ fn contour(figures: &Figures) -> Value {
             "rms": contour.rms / MICROMETER,
             "max_within_ends": contour.max_within_ends / MICROMETER,
             "rms_within_ends": contour.rms_within_ends / MICROMETER,
+            "rapids": contour.rapids.map(|rapids| {
+                json!({ "max": rapids.max / MICROMETER, "rms": rapids.rms / MICROMETER })
+            }),
         })
     })
 }

@@ -12,30 +12,19 @@ use super::psec_error::{TIME, header_unit_hint};
 use virtual_axes_core::text::shortened;
 use virtual_axes_core::yaml;
 
-/// Kind of an input file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FileKind {
-    /// Position setpoints as CSV.
-    PsecCsv,
-    /// Position setpoints as YAML, a `JointTrajectory`.
-    PsecYaml,
-    /// MCAP recording.
-    Mcap,
-    /// Machine file with `ros__parameters`.
-    Machine,
-    /// Scenario.
-    Scenario,
-}
-
-impl fmt::Display for FileKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            FileKind::PsecCsv => "setpoints as CSV",
-            FileKind::PsecYaml => "setpoints as YAML",
-            FileKind::Mcap => "an MCAP recording",
-            FileKind::Machine => "a machine file",
-            FileKind::Scenario => "a scenario",
-        })
+virtual_axes_core::named_values! {
+    /// Kind of an input file.
+    pub enum FileKind {
+        /// Position setpoints as CSV.
+        PsecCsv = "setpoints as CSV",
+        /// Position setpoints as YAML, a `JointTrajectory`.
+        PsecYaml = "setpoints as YAML",
+        /// MCAP recording.
+        Mcap = "an MCAP recording",
+        /// Machine file with `ros__parameters`.
+        Machine = "a machine file",
+        /// Scenario.
+        Scenario = "a scenario",
     }
 }
 

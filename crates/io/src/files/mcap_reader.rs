@@ -1,14 +1,14 @@
 //! Reading and checking MCAP recordings (rosbag2, profile `ros2`).
 
 use std::io::{self, BufReader, Read, Seek};
-use std::marker::PhantomData;
 
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, Message};
-use serde::de::{DeserializeOwned, DeserializeSeed};
+use serde::de::DeserializeOwned;
 
 use super::cdr;
+use super::error::FileError;
 use super::mcap_messages::{BLOCK, Messages, has_complete_fields};
 use virtual_axes_core::text::shortened;
 
@@ -31,27 +31,6 @@ pub(super) enum Completeness {
     Unfinished,
 }
 
-/// Error of reading an MCAP file.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum McapFileError {
-    /// The file cannot be opened or read.
-    #[error("{at}: {reason}")]
-    Unreadable {
-        /// Name of the file.
-        at: String,
-        /// Error message of the operating system.
-        reason: String,
-    },
-    /// The file is not MCAP, incomplete or damaged.
-    #[error("{at}: not a complete MCAP recording: {reason}")]
-    Damaged {
-        /// Name of the file.
-        at: String,
-        /// Error message of the MCAP parser.
-        reason: String,
-    },
-}
-
 /// Returns the type name of a message, if the recording contains its schema.
 pub(super) fn type_of<'a>(message: &'a Message<'_>) -> Option<&'a str> {
     message.channel.schema.as_ref().map(|schema| schema.name.as_str())
@@ -62,23 +41,12 @@ pub(super) fn type_of<'a>(message: &'a Message<'_>) -> Option<&'a str> {
 /// # Errors
 /// Returns the reason if the message is not CDR or not of type `T`.
 pub(super) fn decode<T: DeserializeOwned>(message: &Message<'_>) -> Result<T, String> {
-    decode_with(PhantomData::<T>, message)
-}
-
-/// Decodes a message with `seed`.
-///
-/// # Errors
-/// Returns the reason if the message is not CDR or not of the type of `seed`.
-pub(super) fn decode_with<'a, S: DeserializeSeed<'a>>(
-    seed: S,
-    message: &'a Message<'_>,
-) -> Result<S::Value, String> {
     let encoding = &message.channel.message_encoding;
     if encoding != ENCODING {
         let found = shortened(encoding);
         return Err(format!("the message encoding is \"{found}\", must be \"{ENCODING}\""));
     }
-    cdr::decode(seed, &message.data)
+    cdr::decode(&message.data)
 }
 
 fn options() -> LinearReaderOptions {
@@ -89,21 +57,20 @@ fn options() -> LinearReaderOptions {
 pub(super) fn read_messages<R: Read + Seek>(
     mut input: R,
     name: &str,
-) -> Result<Messages<BufReader<R>>, McapFileError> {
-    input.rewind().map_err(|error| read_error(name, &error))?;
+) -> Result<Messages<BufReader<R>>, FileError> {
+    input.rewind().map_err(|error| FileError::new(name, error))?;
     Ok(Messages::new(BufReader::with_capacity(BLOCK, input), options()))
 }
 
 /// Checks the lengths of all chunks, and that records fill each uncompressed chunk, as the MCAP reader requires.
 /// Returns the completeness of the file.
-pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<Completeness, McapFileError> {
+pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<Completeness, FileError> {
     input.rewind().map_err(|error| match error.kind() {
-        io::ErrorKind::NotSeekable => McapFileError::Unreadable {
-            at: name.to_owned(),
-            reason: "an MCAP recording is read more than once and must be a regular file, not a pipe"
-                .to_owned(),
-        },
-        _ => read_error(name, &error),
+        io::ErrorKind::NotSeekable => FileError::new(
+            name,
+            "an MCAP recording is read more than once and must be a regular file, not a pipe",
+        ),
+        _ => FileError::new(name, error),
     })?;
     let mut input = BufReader::with_capacity(BLOCK, input);
     let mut reader = LinearReader::new_with_options(options().with_emit_chunks(true));
@@ -124,7 +91,7 @@ pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<
                 let read = loop {
                     match input.read(reader.insert(wanted.min(BLOCK))) {
                         Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                        read => break read.map_err(|error| read_error(name, &error))?,
+                        read => break read.map_err(|error| FileError::new(name, error))?,
                     }
                 };
                 found += read;
@@ -150,11 +117,11 @@ pub(super) fn check_chunks<R: Read + Seek>(input: &mut R, name: &str) -> Result<
 }
 
 /// Returns the error for an unfinished recording.
-pub(super) fn unfinished_error(name: &str) -> McapFileError {
-    let reason =
-        "the end of the file is missing, its writer was terminated (`mcap recover` repairs the file)"
-            .to_owned();
-    McapFileError::Damaged { at: name.to_owned(), reason }
+pub(super) fn unfinished_error(name: &str) -> FileError {
+    damaged(
+        name,
+        "the end of the file is missing, its writer was terminated (`mcap recover` repairs the file)",
+    )
 }
 
 /// Returns true if `records` consists of complete records only.
@@ -170,14 +137,15 @@ fn is_complete_records(mut records: &[u8]) -> bool {
     true
 }
 
-pub(super) fn read_error(name: &str, error: &io::Error) -> McapFileError {
-    McapFileError::Unreadable { at: name.to_owned(), reason: error.to_string() }
+/// Returns the error for a file that is not MCAP, incomplete or damaged.
+pub(super) fn damaged(name: &str, reason: &str) -> FileError {
+    FileError::new(name, format_args!("not a complete MCAP recording: {reason}"))
 }
 
 /// Converts an error of the MCAP parser.
-pub(super) fn parse_error(name: &str, error: &McapError) -> McapFileError {
+pub(super) fn parse_error(name: &str, error: &McapError) -> FileError {
     let reason = match error {
-        McapError::Io(error) if error.raw_os_error().is_some() => return read_error(name, error),
+        McapError::Io(error) if error.raw_os_error().is_some() => return FileError::new(name, error),
         McapError::Io(error) => {
             format!("a chunk cannot be decompressed: {}", shortened(&error.to_string()))
         }
@@ -190,5 +158,5 @@ pub(super) fn parse_error(name: &str, error: &McapError) -> McapFileError {
         McapError::BadMagic => "the MCAP magic bytes are missing at the start or the end".to_owned(),
         error => shortened(&error.to_string()),
     };
-    McapFileError::Damaged { at: name.to_owned(), reason }
+    damaged(name, &reason)
 }

@@ -5,14 +5,14 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use super::error::FileError;
 use super::lines::{Lines, fields};
-use super::psec_error::{MAX_TIME, PsecError, TIME};
-use super::psec_row::PsecRow;
-use super::psec_steps::{TimeGap, TimeSteps};
-use virtual_axes_core::text::nearest_name;
-use virtual_axes_core::trajectory::JointLimits;
+use super::psec_error::{MAX_TIME, TIME, header_unit_hint, separator_hint, unit_hint};
+use super::psec_row::{PsecRow, TimeGap, TimeSteps};
+use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 use virtual_axes_core::trajectory::spline::{KinematicState, Segment, SplineDegree};
-use virtual_axes_core::units::{Nanoseconds, SECOND_NS, seconds};
+use virtual_axes_core::trajectory::{JointLimits, Rejection};
+use virtual_axes_core::units::{Nanoseconds, Rounded, SECOND_NS, seconds};
 
 /// Row of the file.
 #[derive(Debug, Clone, Default)]
@@ -63,12 +63,10 @@ impl PsecCsvReader<File> {
     /// Opens a file; see [`PsecCsvReader::new`].
     ///
     /// # Errors
-    /// Returns a [`PsecError`] if the file, its header or its first row is invalid.
-    pub fn open(path: &Path, period: Nanoseconds, joints: &[JointLimits]) -> Result<Self, PsecError> {
+    /// Returns a [`FileError`] if the file, its header or its first row is invalid.
+    pub fn open(path: &Path, period: Nanoseconds, joints: &[JointLimits]) -> Result<Self, FileError> {
         let name = path.display().to_string();
-        let unreadable =
-            |error: std::io::Error| PsecError::Unreadable { at: name.clone(), reason: error.to_string() };
-        let file = File::open(path).map_err(unreadable)?;
+        let file = File::open(path).map_err(|error| FileError::new(&name, error))?;
         Self::new(file, &name, period, joints)
     }
 }
@@ -78,8 +76,8 @@ impl<R: Read> PsecCsvReader<R> {
     /// `joints` are all joints of the machine.
     ///
     /// # Errors
-    /// Returns a [`PsecError`] if the header or the first row is invalid.
-    pub fn new(input: R, name: &str, period: Nanoseconds, joints: &[JointLimits]) -> Result<Self, PsecError> {
+    /// Returns a [`FileError`] if the header or the first row is invalid.
+    pub fn new(input: R, name: &str, period: Nanoseconds, joints: &[JointLimits]) -> Result<Self, FileError> {
         debug_assert!(period > 0, "the period is positive");
         let mut psec = PsecCsvReader {
             lines: Lines::new(input),
@@ -100,7 +98,7 @@ impl<R: Read> PsecCsvReader<R> {
         };
         psec.read_header(joints)?;
         if !psec.read_point()? {
-            return Err(PsecError::Empty { at: psec.name });
+            return Err(FileError::new(psec.name, "there is no setpoint below the header"));
         }
         psec.first_time = psec.after.time;
         psec.previous = vec![0.0; psec.joint_indices.len()];
@@ -172,10 +170,10 @@ impl<R: Read> PsecCsvReader<R> {
     /// [`joints`](Self::joints). Returns false after the last cycle.
     ///
     /// # Errors
-    /// Returns a [`PsecError`] for the first invalid row or setpoint; later calls return false.
+    /// Returns a [`FileError`] for the first invalid row or setpoint; later calls return false.
     // An iterator could not lend the row.
     #[allow(clippy::should_implement_trait)]
-    pub fn next(&mut self, row: &mut [f64]) -> Result<bool, PsecError> {
+    pub fn next(&mut self, row: &mut [f64]) -> Result<bool, FileError> {
         debug_assert_eq!(row.len(), self.joint_indices.len(), "a value per joint");
         if self.is_done {
             return Ok(false);
@@ -194,7 +192,7 @@ impl<R: Read> PsecCsvReader<R> {
         Ok(true)
     }
 
-    fn advance(&mut self) -> Result<(), PsecError> {
+    fn advance(&mut self) -> Result<(), FileError> {
         std::mem::swap(&mut self.before, &mut self.after);
         if !self.read_point()? {
             // The last row stays in `after`.
@@ -230,7 +228,7 @@ impl<R: Read> PsecCsvReader<R> {
         }
     }
 
-    fn check(&self, time: Nanoseconds, row: &[f64]) -> Result<(), PsecError> {
+    fn check(&self, time: Nanoseconds, row: &[f64]) -> Result<(), FileError> {
         let period = seconds(self.period);
         // End of the segment of this cycle.
         let point = if self.before.time == time { &self.before } else { &self.after };
@@ -243,7 +241,7 @@ impl<R: Read> PsecCsvReader<R> {
             } else {
                 joint.check_speed(point.index, speed, "speed")
             };
-            checked.map_err(|rejection| PsecError::Point { at: self.at(point.line), rejection })?;
+            checked.map_err(|rejection| point_error(self.at(point.line), &rejection))?;
         }
         Ok(())
     }
@@ -252,12 +250,12 @@ impl<R: Read> PsecCsvReader<R> {
         format!("{}:{line}", self.name)
     }
 
-    fn read_header(&mut self, joints: &[JointLimits]) -> Result<(), PsecError> {
+    fn read_header(&mut self, joints: &[JointLimits]) -> Result<(), FileError> {
         let name = self.name.clone();
         let (line, text) = match self.lines.next() {
             Ok(found) => found.unwrap_or((1, "")),
             Err((line, reason)) => {
-                return Err(PsecError::Unreadable { at: format!("{name}:{line}"), reason });
+                return Err(FileError::new(format_args!("{name}:{line}"), reason));
             }
         };
         let at = format!("{name}:{line}");
@@ -265,24 +263,27 @@ impl<R: Read> PsecCsvReader<R> {
         let time = header.next();
         self.columns = header.map(str::to_owned).collect();
         if time != Some(TIME) || self.columns.is_empty() || self.columns.iter().any(String::is_empty) {
-            return Err(PsecError::Header { at, found: super::shortened(text.trim()) });
+            let reason = format!(
+                "the header is \"{}\", must be \"{TIME}\", then one joint name per column",
+                shortened(text.trim())
+            );
+            return Err(FileError::new(at, reason));
         }
         for column in &self.columns {
             let Some(index) = joints.iter().position(|joint| joint.name == *column) else {
                 let names = joints.iter().map(|joint| joint.name.as_str());
-                return Err(PsecError::UnknownJoint {
-                    at,
-                    found: super::shortened(column),
-                    known: names.clone().collect::<Vec<_>>().join(", "),
-                    nearest: names
-                        .clone()
-                        .find(|name| name.eq_ignore_ascii_case(column))
-                        .map(str::to_owned)
-                        .or_else(|| nearest_name(column, names)),
-                });
+                let nearest = names.clone().find(|name| name.eq_ignore_ascii_case(column)).map(str::to_owned);
+                let found = shortened(column);
+                let reason = format!(
+                    "there is no joint \"{found}\"; there are {}{}{}",
+                    names.clone().collect::<Vec<_>>().join(", "),
+                    nearest_hint(&nearest.or_else(|| nearest_name(column, names))),
+                    header_unit_hint(&found)
+                );
+                return Err(FileError::new(at, reason));
             };
             if self.joint_indices.contains(&index) {
-                return Err(PsecError::DuplicateJoint { at, joint: column.clone() });
+                return Err(FileError::new(at, format_args!("joint {column} has two columns")));
             }
             self.joint_indices.push(index);
             self.limits.push(joints[index].clone());
@@ -291,12 +292,10 @@ impl<R: Read> PsecCsvReader<R> {
     }
 
     /// Reads and checks the next row into `after`; returns false at the end of the file.
-    fn read_point(&mut self) -> Result<bool, PsecError> {
+    fn read_point(&mut self) -> Result<bool, FileError> {
         let PsecCsvReader { lines, name, columns, limits, before, after, rows, .. } = self;
-        let found = lines.next().map_err(|(line, reason)| {
-            let at = format!("{name}:{line}");
-            PsecError::Unreadable { at, reason }
-        })?;
+        let found =
+            lines.next().map_err(|(line, reason)| FileError::new(format_args!("{name}:{line}"), reason))?;
         let Some((line, text)) = found else { return Ok(false) };
         let at = || format!("{name}:{line}");
         let wanted = columns.len() + 1;
@@ -306,28 +305,34 @@ impl<R: Read> PsecCsvReader<R> {
         after.positions.extend(values.by_ref().take(columns.len()));
         let found = 1 + after.positions.len() + values.count();
         if found != wanted {
-            return Err(PsecError::Columns { at: at(), found, wanted, has_semicolon: text.contains(';') });
+            let hint = separator_hint(found, wanted, text.contains(';'));
+            let reason = format!("{found} values, the header names {wanted} columns{hint}");
+            return Err(FileError::new(at(), reason));
         }
         let number_error = |column: usize| {
             let name = column.checked_sub(1).and_then(|column| columns.get(column));
-            PsecError::Number {
-                at: at(),
-                column: name.map_or(TIME, String::as_str).to_owned(),
-                found: super::shortened(fields(text).nth(column).unwrap_or_default()),
-            }
+            let name = name.map_or(TIME, String::as_str);
+            let found = shortened(fields(text).nth(column).unwrap_or_default());
+            FileError::new(at(), format_args!("{name} is \"{found}\", must be a finite number"))
         };
         if !time.is_finite() {
             return Err(number_error(0));
         }
         if !(0.0..=MAX_TIME).contains(&time) {
-            return Err(PsecError::Time { at: at(), found: time });
+            let reason = format!(
+                "{TIME} is {} s, must lie in 0 … {MAX_TIME} s (100 h); is the column in s?",
+                Rounded(time)
+            );
+            return Err(FileError::new(at(), reason));
         }
         let first = before.positions.is_empty();
         after.line = line;
         after.index = if first { 0 } else { before.index + 1 };
         after.time = nearest_nanosecond(time);
         if !first && after.time <= before.time {
-            return Err(PsecError::NotIncreasing { at: at(), found: time, before: seconds(before.time) });
+            let before = seconds(before.time);
+            let reason = format!("{TIME} is {time} s, must be later than {before} s of the previous row");
+            return Err(FileError::new(at(), reason));
         }
         for (column, (joint, &position)) in limits.iter().zip(&after.positions).enumerate() {
             if !position.is_finite() {
@@ -335,13 +340,18 @@ impl<R: Read> PsecCsvReader<R> {
             }
             joint
                 .check_travel_limits(Some(after.index), position)
-                .map_err(|rejection| PsecError::Point { at: at(), rejection })?;
+                .map_err(|rejection| point_error(at(), &rejection))?;
         }
         if let Some(rows) = rows {
             rows.push(PsecRow::new(line, after.time, &after.positions).with_digits_of(text));
         }
         Ok(true)
     }
+}
+
+/// Returns the error of a setpoint that the joint does not permit.
+fn point_error(at: String, rejection: &Rejection) -> FileError {
+    FileError::new(at, format_args!("{rejection}{}", unit_hint(rejection)))
 }
 
 /// Parses a number; NaN if invalid.

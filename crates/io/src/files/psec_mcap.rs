@@ -8,71 +8,19 @@ use std::path::Path;
 
 use mcap::Message;
 
+use super::error::{FileError, shorten_names};
 use super::mcap_messages::Messages;
 use super::mcap_reader::{
-    Completeness, McapFileError, check_chunks, decode_with, parse_error, read_error, read_messages, type_of,
-    unfinished_error,
+    Completeness, check_chunks, damaged, decode, parse_error, read_messages, type_of, unfinished_error,
 };
-use super::shorten_names;
-use crate::messages::RequestSeed;
+use super::psec_error::late_point;
+use crate::messages;
 use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
-use virtual_axes_core::trajectory::{Rejection, TrajectoryRequest};
+use virtual_axes_core::trajectory::TrajectoryRequest;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
 /// Message type of trajectories.
 const TYPE: &str = "trajectory_msgs/msg/JointTrajectory";
-
-/// Error of reading trajectories from an MCAP recording.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TrajectoryRecordingError {
-    /// The file cannot be read, is incomplete or damaged.
-    #[error(transparent)]
-    File(#[from] McapFileError),
-    /// The recording contains no trajectory.
-    #[error("{at}: there is no message {TYPE}; {}", topics_text(.topics))]
-    NoTrajectory {
-        /// Name of the file.
-        at: String,
-        /// Topics with messages of other types.
-        topics: Vec<String>,
-    },
-    /// Several topics carry trajectories.
-    #[error("{at}: several topics carry trajectories, {}: select one by its name", .topics.join(", "))]
-    SeveralTopics {
-        /// Name of the file.
-        at: String,
-        /// Topics with trajectories.
-        topics: Vec<String>,
-    },
-    /// The selected topic has no trajectory.
-    #[error("{at}: there is no trajectory on {topic}; there are some on {}{}", .topics.join(", "), nearest_hint(.nearest))]
-    UnknownTopic {
-        /// Name of the file.
-        at: String,
-        /// Selected topic.
-        topic: String,
-        /// Topics with trajectories.
-        topics: Vec<String>,
-        /// Most similar topic.
-        nearest: Option<String>,
-    },
-    /// A message cannot be decoded.
-    #[error("{at}: {reason}")]
-    Message {
-        /// File, topic, message index from 0 and log time.
-        at: String,
-        /// Reason of the decoder.
-        reason: String,
-    },
-    /// A trajectory is invalid for every machine.
-    #[error("{at}: {rejection}")]
-    Rejected {
-        /// File, topic, message index from 0 and log time.
-        at: String,
-        /// Reason of the rejection.
-        rejection: Rejection,
-    },
-}
 
 fn topics_text(topics: &[String]) -> String {
     match topics {
@@ -109,10 +57,10 @@ impl McapTrajectories<File> {
     /// Opens a recording; see [`McapTrajectories::new`].
     ///
     /// # Errors
-    /// Returns a [`TrajectoryRecordingError`] as [`McapTrajectories::new`].
-    pub fn open(path: &Path, topic: Option<&str>) -> Result<Self, TrajectoryRecordingError> {
+    /// Returns a [`FileError`] as [`McapTrajectories::new`].
+    pub fn open(path: &Path, topic: Option<&str>) -> Result<Self, FileError> {
         let name = path.display().to_string();
-        let file = File::open(path).map_err(|error| read_error(&name, &error))?;
+        let file = File::open(path).map_err(|error| FileError::new(&name, error))?;
         Self::new(file, &name, topic)
     }
 }
@@ -122,12 +70,12 @@ impl<R: Read + Seek> McapTrajectories<R> {
     /// `name` is the file name in errors.
     ///
     /// # Errors
-    /// Returns a [`TrajectoryRecordingError`] if the recording is incomplete or damaged, if `topic` has no trajectory,
+    /// Returns a [`FileError`] if the recording is incomplete or damaged, if `topic` has no trajectory,
     /// or if several topics have trajectories and `topic` is `None`.
-    pub fn new(mut input: R, name: &str, topic: Option<&str>) -> Result<Self, TrajectoryRecordingError> {
+    pub fn new(mut input: R, name: &str, topic: Option<&str>) -> Result<Self, FileError> {
         if check_chunks(&mut input, name)? == Completeness::Unfinished {
             // The motion would be incomplete.
-            return Err(unfinished_error(name).into());
+            return Err(unfinished_error(name));
         }
         let mut others = Vec::new();
         let mut found: BTreeMap<String, Vec<u64>> = BTreeMap::new();
@@ -149,22 +97,26 @@ impl<R: Read + Seek> McapTrajectories<R> {
         let topic = match (topic, topics.as_slice()) {
             (_, []) => {
                 others.sort();
-                return Err(TrajectoryRecordingError::NoTrajectory { at, topics: shorten_names(&others) });
+                let topics = topics_text(&shorten_names(&others));
+                return Err(FileError::new(at, format_args!("there is no message {TYPE}; {topics}")));
             }
             (None, [topic]) => topic.clone(),
             (None, _) => {
-                return Err(TrajectoryRecordingError::SeveralTopics { at, topics: shorten_names(&topics) });
+                let topics = shorten_names(&topics).join(", ");
+                let reason = format!("several topics carry trajectories, {topics}: select one by its name");
+                return Err(FileError::new(at, reason));
             }
             (Some(topic), _) => topic.to_owned(),
         };
         let Some(times) = found.remove(&topic) else {
             let nearest = nearest_name(&topic, topics.iter().map(String::as_str));
-            return Err(TrajectoryRecordingError::UnknownTopic {
-                at,
-                topic: shortened(&topic),
-                topics: shorten_names(&topics),
-                nearest,
-            });
+            let reason = format!(
+                "there is no trajectory on {}; there are some on {}{}",
+                shortened(&topic),
+                shorten_names(&topics).join(", "),
+                nearest_hint(&nearest)
+            );
+            return Err(FileError::new(at, reason));
         };
         let mut order: Vec<usize> = (0..times.len()).collect();
         // Stable sort: messages of equal log time stay in file order.
@@ -190,7 +142,7 @@ impl<R: Read + Seek> McapTrajectories<R> {
     }
 
     /// Returns the message at index `number` of the topic in file order.
-    fn message(&mut self, number: usize) -> Result<Message<'static>, TrajectoryRecordingError> {
+    fn message(&mut self, number: usize) -> Result<Message<'static>, FileError> {
         if let Some(message) = self.early.remove(&number) {
             return Ok(message);
         }
@@ -206,15 +158,14 @@ impl<R: Read + Seek> McapTrajectories<R> {
             }
             self.early.insert(found, message);
         }
-        let reason = "the file was truncated while it was read".to_owned();
-        Err(McapFileError::Damaged { at: self.name.clone(), reason }.into())
+        Err(damaged(&self.name, "the file was truncated while it was read"))
     }
 
     fn request(
         &self,
         number: usize,
         message: &Message<'_>,
-    ) -> Result<(Nanoseconds, TrajectoryRequest), TrajectoryRecordingError> {
+    ) -> Result<(Nanoseconds, TrajectoryRequest), FileError> {
         let log_time = Nanoseconds::try_from(message.log_time).unwrap_or(Nanoseconds::MAX);
         let at = || {
             format!(
@@ -224,15 +175,18 @@ impl<R: Read + Seek> McapTrajectories<R> {
                 seconds(log_time)
             )
         };
-        let request = decode_with(RequestSeed, message)
-            .map_err(|reason| TrajectoryRecordingError::Message { at: at(), reason })?
-            .map_err(|rejection| TrajectoryRecordingError::Rejected { at: at(), rejection })?;
-        Ok((log_time, request))
+        let trajectory = decode(message).map_err(|reason| FileError::new(at(), reason))?;
+        let request = messages::request(&trajectory, usize::MAX)
+            .map_err(|rejection| FileError::new(at(), rejection))?;
+        match late_point(&request) {
+            Some((_, reason)) => Err(FileError::new(at(), reason)),
+            None => Ok((log_time, request)),
+        }
     }
 }
 
 impl<R: Read + Seek> Iterator for McapTrajectories<R> {
-    type Item = Result<(Nanoseconds, TrajectoryRequest), TrajectoryRecordingError>;
+    type Item = Result<(Nanoseconds, TrajectoryRequest), FileError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         let number = self.order.pop_front()?;

@@ -1,49 +1,20 @@
 //! Writing of position setpoints as CSV, YAML (format of `ros2 topic pub`) or MCAP.
 
 use std::io::{self, Write};
-use std::path::Path;
 
 use serde::ser::{Serialize, Serializer};
 
+use super::decimal;
 use super::mcap_writer::{DEFAULT_QOS, McapTopic, McapWriter};
 use super::psec_error::TIME;
-use super::trace::extension;
-use super::{OutputFile, decimal};
 use crate::messages::builtin_interfaces::msg::Duration;
 use crate::messages::std_msgs::msg::Header;
-use crate::messages::{self, Schema};
+use crate::messages::trajectory_msgs::msg::JointTrajectory;
+use crate::messages::{self, Recorded};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
 /// Topic of the trajectory in a recording.
 const TOPIC: &str = "/psec";
-
-/// Writer of position setpoints. Dropping it before [`finish`](Self::finish) leaves no file.
-pub trait PsecWriter {
-    /// Adds one setpoint per joint, m or rad, at `time`, ns from the start.
-    ///
-    /// # Errors
-    /// Returns the errors of the output.
-    fn row(&mut self, time: Nanoseconds, positions: &[f64]) -> io::Result<()>;
-
-    /// Completes the file.
-    ///
-    /// # Errors
-    /// Returns the errors of the output.
-    fn finish(self: Box<Self>) -> io::Result<()>;
-}
-
-/// Creates a setpoint file of `joints` in the format of the extension of `path`: `.csv`, `.yaml` or `.mcap`. The
-/// format for a device or a pipe without an extension is CSV.
-///
-/// # Errors
-/// Returns the errors of the output, and an error for an unknown extension.
-pub fn psec_writer(path: &Path, joints: &[String]) -> io::Result<Box<dyn PsecWriter>> {
-    match extension(path, &["csv", "mcap", "yaml"])? {
-        "mcap" => Ok(Box::new(PsecMcapWriter::new(OutputFile::create(path)?, joints)?)),
-        "yaml" => Ok(Box::new(PsecYamlWriter::new(OutputFile::create(path)?, joints)?)),
-        _ => Ok(Box::new(PsecCsvWriter::new(OutputFile::create(path)?, joints)?)),
-    }
-}
 
 /// Writer of setpoints as CSV, `time,x,…`; numbers are the shortest decimals that parse to the same value.
 #[derive(Debug)]
@@ -156,7 +127,7 @@ impl<W: Write> PsecMcapWriter<W> {
     /// Returns the errors of the output.
     pub fn new(output: W, joints: &[String]) -> io::Result<Self> {
         let mut recording = McapWriter::new(output)?;
-        let topic = recording.topic(TOPIC, &Schema::joint_trajectory(), DEFAULT_QOS)?;
+        let topic = recording.topic(TOPIC, &JointTrajectory::schema(), DEFAULT_QOS)?;
         let message = FlatTrajectory { joint_names: joints.to_vec(), ..FlatTrajectory::default() };
         Ok(PsecMcapWriter { recording, topic, message })
     }
@@ -240,19 +211,3 @@ fn message_time(time: Nanoseconds) -> io::Result<(i32, u32)> {
         format!("the time is {} s, must be within ±{} s, the range of a message", seconds(time), i32::MAX);
     Err(io::Error::new(io::ErrorKind::InvalidInput, text))
 }
-
-macro_rules! writers {
-    ($($writer:ident),*) => {$(
-        impl PsecWriter for $writer<OutputFile> {
-            fn row(&mut self, time: Nanoseconds, positions: &[f64]) -> io::Result<()> {
-                $writer::row(self, time, positions)
-            }
-
-            fn finish(self: Box<Self>) -> io::Result<()> {
-                $writer::finish(*self)?.finish()
-            }
-        }
-    )*};
-}
-
-writers!(PsecCsvWriter, PsecYamlWriter, PsecMcapWriter);

@@ -9,58 +9,36 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde_saphyr::Spanned;
 
+use super::error::FileError;
+use super::psec_error::late_point;
 use crate::messages::builtin_interfaces::msg::{Duration, Time};
 use crate::messages::std_msgs::msg::Header;
 use crate::messages::trajectory_msgs::msg::{JointTrajectory, JointTrajectoryPoint};
 use crate::messages::{self};
-use virtual_axes_core::trajectory::{Rejection, TrajectoryRequest};
+use virtual_axes_core::trajectory::TrajectoryRequest;
 use virtual_axes_core::yaml::{self, YamlNumber};
 
 /// Placeholder of `ros2 topic echo` for omitted values.
 const ELLIPSIS: &str = "'...'";
 
-/// Error of reading trajectories from YAML, with file and line.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TrajectoryYamlError {
-    /// The text is not YAML or not a message.
-    #[error("{at}: {reason}")]
-    Syntax {
-        /// File and line.
-        at: String,
-        /// Error message of the YAML parser.
-        reason: String,
-    },
-    /// A trajectory is invalid for every machine.
-    #[error("{at}: {rejection}")]
-    Rejected {
-        /// File and line.
-        at: String,
-        /// Reason of the rejection.
-        rejection: Rejection,
-    },
-    /// The text contains no message.
-    #[error("{at}: the file contains no trajectory, a mapping with joint_names and points")]
-    Empty {
-        /// Name of the file.
-        at: String,
-    },
-}
-
 /// Reads the trajectories of a YAML text, one per document; missing fields have default values. `file` is the file
 /// name in errors.
 ///
 /// # Errors
-/// Returns a [`TrajectoryYamlError`] for the first error in the text.
-pub fn read_psec_yaml(text: &str, file: &str) -> Result<Vec<TrajectoryRequest>, TrajectoryYamlError> {
+/// Returns a [`FileError`] for the first error in the text.
+pub fn read_psec_yaml(text: &str, file: &str) -> Result<Vec<TrajectoryRequest>, FileError> {
     let documents: Vec<Spanned<Message>> = yaml::documents(text).map_err(|mut error| {
         if text.lines().nth(error.line.saturating_sub(1) as usize).is_some_and(|text| text.contains(ELLIPSIS))
         {
             error.reason += "; use `ros2 topic echo --full-length` to print all values";
         }
-        TrajectoryYamlError::Syntax { at: error.position(file), reason: error.reason }
+        FileError::new(error.position(file), error.reason)
     })?;
     if documents.is_empty() {
-        return Err(TrajectoryYamlError::Empty { at: file.to_owned() });
+        return Err(FileError::new(
+            file,
+            "the file contains no trajectory, a mapping with joint_names and points",
+        ));
     }
     documents
         .into_iter()
@@ -68,10 +46,16 @@ pub fn read_psec_yaml(text: &str, file: &str) -> Result<Vec<TrajectoryRequest>, 
             let begin = document.referenced.line();
             let lines: Vec<u64> = document.value.points.iter().map(|p| p.referenced.line()).collect();
             let message = JointTrajectory::from(document.value);
-            messages::request(&message, usize::MAX).map_err(|rejection| {
-                let line = rejection.index.and_then(|index| lines.get(index).copied());
-                TrajectoryYamlError::Rejected { at: yaml::position(file, line.unwrap_or(begin)), rejection }
-            })
+            let at = |index: Option<usize>| {
+                let line = index.and_then(|index| lines.get(index).copied());
+                yaml::position(file, line.unwrap_or(begin))
+            };
+            let request = messages::request(&message, usize::MAX)
+                .map_err(|rejection| FileError::new(at(rejection.index), rejection))?;
+            match late_point(&request) {
+                Some((index, reason)) => Err(FileError::new(at(Some(index)), reason)),
+                None => Ok(request),
+            }
         })
         .collect()
 }

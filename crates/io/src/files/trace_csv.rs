@@ -2,9 +2,9 @@
 
 use std::io::{self, Write};
 
-use super::decimal;
+use super::PsecCsvWriter;
 use virtual_axes_core::machine::AxisSample;
-use virtual_axes_core::units::{Nanoseconds, seconds};
+use virtual_axes_core::units::Nanoseconds;
 
 /// Column name and its value in a sample.
 type Signal = (&'static str, fn(&AxisSample) -> f64);
@@ -24,9 +24,9 @@ const SIGNALS: [Signal; 8] = [
 /// Writer of a trace as CSV; numbers are the shortest decimals that parse to the same value.
 #[derive(Debug)]
 pub struct TraceCsvWriter<W> {
-    output: W,
-    /// Buffer of a row.
-    row: Vec<u8>,
+    rows: PsecCsvWriter<W>,
+    /// Values of a row.
+    values: Vec<f64>,
 }
 
 impl<W: Write> TraceCsvWriter<W> {
@@ -34,15 +34,10 @@ impl<W: Write> TraceCsvWriter<W> {
     ///
     /// # Errors
     /// Returns the errors of the output.
-    pub fn new(mut output: W, joints: &[String]) -> io::Result<Self> {
-        output.write_all(b"time")?;
-        for joint in joints {
-            for (signal, _) in SIGNALS {
-                write!(output, ",{joint}.{signal}")?;
-            }
-        }
-        output.write_all(b"\n")?;
-        Ok(TraceCsvWriter { output, row: Vec::new() })
+    pub fn new(output: W, joints: &[String]) -> io::Result<Self> {
+        let columns = joints.iter().flat_map(|joint| SIGNALS.map(|(signal, _)| format!("{joint}.{signal}")));
+        let columns: Vec<_> = columns.collect();
+        Ok(TraceCsvWriter { rows: PsecCsvWriter::new(output, &columns)?, values: Vec::new() })
     }
 
     /// Adds a row at `time`, ns. The units in the file are s, m, m/s, A, V (rad, rad/s for rotary axes).
@@ -50,24 +45,16 @@ impl<W: Write> TraceCsvWriter<W> {
     /// # Errors
     /// Returns the errors of the output.
     pub fn row(&mut self, time: Nanoseconds, samples: &[AxisSample]) -> io::Result<()> {
-        self.row.clear();
-        decimal::push(&mut self.row, seconds(time));
-        for sample in samples {
-            for (_, value) in SIGNALS {
-                self.row.push(b',');
-                decimal::push(&mut self.row, value(sample));
-            }
-        }
-        self.row.push(b'\n');
-        self.output.write_all(&self.row)
+        self.values.clear();
+        self.values.extend(samples.iter().flat_map(|sample| SIGNALS.map(|(_, value)| value(sample))));
+        self.rows.row(time, &self.values)
     }
 
     /// Flushes and returns the output.
     ///
     /// # Errors
     /// Returns the errors of the output.
-    pub fn finish(mut self) -> io::Result<W> {
-        self.output.flush()?;
-        Ok(self.output)
+    pub fn finish(self) -> io::Result<W> {
+        self.rows.finish()
     }
 }

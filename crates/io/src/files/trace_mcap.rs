@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use super::mcap_writer::{DEFAULT_QOS, McapTopic, McapWriter};
 use crate::messages::sensor_msgs::msg::JointState;
-use crate::messages::{DriveStates, MotorCurrents, Sampled, Schema};
+use crate::messages::{DriveStates, MotorCurrents, Recorded, Sampled};
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_core::units::Nanoseconds;
 
@@ -25,10 +25,10 @@ impl<W: Write> TraceMcapWriter<W> {
     /// Returns the errors of the output.
     pub fn new(output: W, joints: &[String]) -> io::Result<Self> {
         let mut recording = McapWriter::new(output)?;
-        let states = recording.topic("/joint_states", &Schema::joint_state(), DEFAULT_QOS)?;
+        let states = recording.topic("/joint_states", &JointState::schema(), DEFAULT_QOS)?;
         let currents =
-            recording.topic("/virtual_axes/motor_currents", &Schema::motor_currents(), DEFAULT_QOS)?;
-        let drives = recording.topic("/virtual_axes/drive_states", &Schema::drive_states(), DEFAULT_QOS)?;
+            recording.topic("/virtual_axes/motor_currents", &MotorCurrents::schema(), DEFAULT_QOS)?;
+        let drives = recording.topic("/virtual_axes/drive_states", &DriveStates::schema(), DEFAULT_QOS)?;
         Ok(TraceMcapWriter {
             recording,
             states: (states, JointState::named(joints)),

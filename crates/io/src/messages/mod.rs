@@ -5,7 +5,6 @@ mod own;
 mod pose;
 mod program;
 mod recorded;
-mod request_seed;
 mod schema;
 mod state;
 mod time;
@@ -21,7 +20,6 @@ pub use own::{DriveStates, MotorCurrents, PACKAGE, Source, Status, TrajectoryRes
 pub use pose::{path, pose_stamped};
 pub use program::{ProgramErrorCode, RunProgramFeedback, RunProgramGoal, RunProgramResult};
 pub use recorded::Recorded;
-pub use request_seed::RequestSeed;
 pub use ros2_interfaces_jazzy_serde::{
     action_msgs, builtin_interfaces, diagnostic_msgs, geometry_msgs, nav_msgs, rcl_interfaces, rosgraph_msgs,
     sensor_msgs, std_msgs, std_srvs, trajectory_msgs, unique_identifier_msgs,

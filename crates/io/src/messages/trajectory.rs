@@ -40,7 +40,7 @@ pub fn request(message: &JointTrajectory, max_points: usize) -> Result<Trajector
 }
 
 /// Returns the start time of a trajectory from its header.
-pub(super) fn start(header: &Header) -> Result<Start, Rejection> {
+fn start(header: &Header) -> Result<Start, Rejection> {
     let Time { sec, nanosec } = header.stamp;
     Ok(match nanoseconds(sec, nanosec, format_args!("header.stamp"), None)? {
         0 => Start::Now,
@@ -49,7 +49,7 @@ pub(super) fn start(header: &Header) -> Result<Start, Rejection> {
 }
 
 /// Returns the time of point `index`, ns from the start.
-pub(super) fn point_time(time: &Duration, index: usize) -> Result<Nanoseconds, Rejection> {
+fn point_time(time: &Duration, index: usize) -> Result<Nanoseconds, Rejection> {
     let Duration { sec, nanosec } = *time;
     nanoseconds(sec, nanosec, format_args!("point {index}, time_from_start"), Some(index))
 }

@@ -1,9 +1,17 @@
-//! Links and joints of the URDF of a machine.
+//! Links and joints of the URDF of a machine, and the error of the conversion.
+
+use nalgebra::Vector3;
 
 use super::shapes::{Shapes, Visual};
-use super::{MACHINE_FRAME, TOOL_FRAME, UrdfError, WORKPIECE_FRAME};
 use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig};
-use virtual_axes_core::kinematics::{AxisRole, Kinematics};
+use virtual_axes_core::kinematics::{AxisRole, Kinematics, Rotation};
+
+/// Root frame: the machine frame of the kinematics.
+pub const MACHINE_FRAME: &str = "machine";
+/// Frame of the workpiece, fixed to the table of C.
+pub const WORKPIECE_FRAME: &str = "workpiece";
+/// Frame of the tool tip, Z along the tool axis toward the spindle.
+pub const TOOL_FRAME: &str = "tool";
 
 /// Travel limit of a linear axis without limit in the machine file, m: the largest allowed value.
 const OPEN_TRAVEL: f64 = 1e3;
@@ -76,32 +84,81 @@ impl Model {
     pub fn new(machine: &MachineConfig, joint_prefix: &str) -> Result<Self, UrdfError> {
         let chain = Chain::new(machine, joint_prefix)?;
         let geometry = machine.kinematics();
-        let ([a_y, a_z], [c_x, c_y], [w_x, w_y, w_z]) =
-            (geometry.pivot_a, geometry.pivot_c, geometry.workpiece);
-        let home = [0.0; 3];
-        let joints = vec![
-            // The tables turn against their joints (ISO 841).
-            chain.joint(AxisRole::A, [MACHINE_FRAME, "cradle"], [0.0, a_y, a_z], [-1.0, 0.0, 0.0]),
-            chain.joint(AxisRole::C, ["cradle", "table"], [c_x, c_y - a_y, -a_z], [0.0, 0.0, -1.0]),
-            fixed("workpiece_mount", ["table", WORKPIECE_FRAME], [w_x - c_x, w_y - c_y, w_z]),
-            chain.joint(AxisRole::X, [MACHINE_FRAME, "x_slide"], home, [1.0, 0.0, 0.0]),
-            chain.joint(AxisRole::Y, ["x_slide", "y_slide"], home, [0.0, 1.0, 0.0]),
-            chain.joint(AxisRole::Z, ["y_slide", "z_slide"], home, [0.0, 0.0, 1.0]),
-            fixed("tool_mount", ["z_slide", TOOL_FRAME], [0.0, 0.0, -geometry.tool_length]),
-        ];
         let shapes = Shapes::new(geometry, |role| chain.axis(role).map(AxisConfig::limits));
-        let link = |name, visuals| Link { name, visuals };
-        let links = vec![
-            link(MACHINE_FRAME, shapes.machine()),
-            link("cradle", shapes.cradle()),
-            link("table", shapes.table()),
-            link(WORKPIECE_FRAME, Vec::new()),
-            link("x_slide", shapes.x_slide()),
-            link("y_slide", shapes.y_slide()),
-            link("z_slide", shapes.z_slide()),
-            link(TOOL_FRAME, shapes.tool()),
-        ];
-        Ok(Model { name: machine.name().to_owned(), links, joints })
+        let (mut heads, tables): (Vec<&Rotation>, Vec<&Rotation>) =
+            chain.kinematics.rotations().iter().partition(|rotation| rotation.is_head());
+        heads.retain(|head| head.joint().is_some());
+        let mut model = Model { name: machine.name().to_owned(), links: Vec::new(), joints: Vec::new() };
+        model.add_link(MACHINE_FRAME, Vec::new());
+        let mut end = ChainEnd { link: MACHINE_FRAME, position: Vector3::zeros() };
+        // The root has no inertia, which KDL does not support.
+        model.add(fixed("bed_mount", end.beside("bed")), shapes.bed());
+        for (place, table) in tables.iter().enumerate().rev() {
+            let link = if place == 0 { "table" } else { "cradle" };
+            // The tables turn against their joints (ISO 841).
+            let joint = chain.joint(table.role(), end.to(link, table.pivot()), -table.direction());
+            let visuals = match (place, table.role()) {
+                (0, _) => shapes.table(),
+                (_, AxisRole::A) => shapes.cradle(),
+                _ => shapes.plate(),
+            };
+            model.add(joint, visuals);
+        }
+        model.add(fixed("workpiece_mount", end.to(WORKPIECE_FRAME, geometry.workpiece.into())), Vec::new());
+
+        let mut end = ChainEnd { link: MACHINE_FRAME, position: Vector3::zeros() };
+        let slides = ["x_slide", "y_slide", "z_slide"];
+        let directions = [Vector3::x(), Vector3::y(), Vector3::z()];
+        for ((role, link), direction) in AxisRole::LINEAR.into_iter().zip(slides).zip(directions) {
+            let joint = chain.joint(role, end.to(link, Vector3::zeros()), direction);
+            model.add(joint, shapes.slide(role, heads.is_empty()));
+        }
+        for (place, head) in heads.iter().enumerate() {
+            let link = if place + 1 == heads.len() { "head" } else { "fork" };
+            let joint = chain.joint(head.role(), end.to(link, head.pivot()), head.direction());
+            let visuals = if link == "head" { shapes.head(head.pivot()) } else { shapes.plate() };
+            model.add(joint, visuals);
+        }
+        let tip = Vector3::new(0.0, 0.0, -geometry.tool_length);
+        model.add(fixed("tool_mount", end.to(TOOL_FRAME, tip)), shapes.tool());
+        Ok(model)
+    }
+
+    fn add_link(&mut self, name: &'static str, visuals: Vec<Visual>) {
+        self.links.push(Link { name, visuals });
+    }
+
+    /// Adds a joint with its child.
+    fn add(&mut self, joint: Joint, visuals: Vec<Visual>) {
+        self.add_link(joint.child, visuals);
+        self.joints.push(joint);
+    }
+}
+
+/// Last link of a chain that is built, with its origin in the machine frame at home, m.
+struct ChainEnd {
+    link: &'static str,
+    position: Vector3<f64>,
+}
+
+/// Place of a joint: parent, child and the origin of the child in the parent at home, m.
+struct Place {
+    parent: &'static str,
+    child: &'static str,
+    origin: [f64; 3],
+}
+
+impl ChainEnd {
+    /// Returns the place of a joint to a link with the same origin, beside the chain.
+    fn beside(&self, child: &'static str) -> Place {
+        Place { parent: self.link, child, origin: [0.0; 3] }
+    }
+
+    /// Returns the place of a joint to a link with the origin `position` in the machine frame, which becomes the end.
+    fn to(&mut self, child: &'static str, position: Vector3<f64>) -> Place {
+        let place = Place { parent: self.link, child, origin: (position - self.position).into() };
+        *self = ChainEnd { link: child, position };
+        place
     }
 }
 
@@ -133,9 +190,9 @@ impl<'a> Chain<'a> {
     }
 
     /// Returns the joint with the role, or a fixed joint if the machine has none.
-    fn joint(&self, role: AxisRole, between: [&'static str; 2], origin: [f64; 3], axis: [f64; 3]) -> Joint {
+    fn joint(&self, role: AxisRole, place: Place, axis: Vector3<f64>) -> Joint {
         let Some(config) = self.axis(role) else {
-            return fixed(&format!("{role}_held"), between, origin);
+            return fixed(&format!("{role}_held"), place);
         };
         let limit = Limit::of(config);
         let kind = match config.kind() {
@@ -143,12 +200,41 @@ impl<'a> Chain<'a> {
             AxisKind::Rotary if limit.travel.is_none() => "continuous",
             AxisKind::Rotary => "revolute",
         };
-        let [parent, child] = between;
+        let Place { parent, child, origin } = place;
         let name = format!("{}{}", self.prefix, config.name());
-        Joint { name, parent, child, origin, motion: Motion::Moves { kind, axis, limit } }
+        Joint { name, parent, child, origin, motion: Motion::Moves { kind, axis: axis.into(), limit } }
     }
 }
 
-fn fixed(name: &str, [parent, child]: [&'static str; 2], origin: [f64; 3]) -> Joint {
+fn fixed(name: &str, Place { parent, child, origin }: Place) -> Joint {
     Joint { name: name.to_owned(), parent, child, origin, motion: Motion::Fixed }
+}
+
+/// Error of the conversion of a machine into a URDF.
+#[derive(Debug, thiserror::Error)]
+pub enum UrdfError {
+    /// A joint has no role in the kinematic chain.
+    #[error(
+        "joint {joint} ({kind}) has no role in the kinematic chain; its joints are x, y, z (linear) and those of \
+         kinematics.chain, at most two of a, b and c (rotary), each at most once"
+    )]
+    NotInChain {
+        /// Name of the joint.
+        joint: String,
+        /// Kind of the joint, `linear` or `rotary`.
+        kind: &'static str,
+    },
+    /// A text contains a character that XML 1.0 does not allow.
+    #[error("{what} {text:?} contains the character {character:?}, which XML does not allow")]
+    NotXml {
+        /// Meaning of the text.
+        what: &'static str,
+        /// Text.
+        text: String,
+        /// First invalid character.
+        character: char,
+    },
+    /// Writing the XML failed.
+    #[error("the URDF cannot be written: {0}")]
+    Write(#[from] std::io::Error),
 }

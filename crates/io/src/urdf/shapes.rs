@@ -1,5 +1,8 @@
-//! Shapes of the links for visualization: boxes and cylinders.
+//! Shapes of the links for visualization and collisions: boxes and cylinders.
 
+use std::iter;
+
+use nalgebra::Vector3;
 use virtual_axes_core::config::{KinematicsConfig, LimitsConfig};
 use virtual_axes_core::kinematics::AxisRole;
 
@@ -126,7 +129,7 @@ impl Shapes {
     }
 
     /// Returns the bed, the posts of A and the column with the rails of X.
-    pub fn machine(&self) -> Vec<Visual> {
+    pub fn bed(&self) -> Vec<Visual> {
         let inner = self.half_cradle() + PLATE + GAP;
         let (width, back) = (inner + SLIDE, self.column() + SLIDE);
         // The cradle turns above the bed.
@@ -179,27 +182,47 @@ impl Shapes {
         ]
     }
 
+    /// Returns the shapes of the slide of a linear axis; the spindle is at that of Z if no head carries it.
+    pub fn slide(&self, role: AxisRole, has_spindle: bool) -> Vec<Visual> {
+        match role {
+            AxisRole::X => self.x_slide(),
+            AxisRole::Y => self.y_slide(),
+            _ => self.z_slide(has_spindle),
+        }
+    }
+
+    /// Returns a plate below a table or above a head, in the frame of its rotary axis.
+    pub fn plate(&self) -> Vec<Visual> {
+        let half = SLIDE / 2.0;
+        vec![block([-half, -half, -PLATE / 2.0], [half, half, PLATE / 2.0], CRADLE)]
+    }
+
+    /// Returns the spindle in the frame of the head that carries it, with its rotary axis at `pivot` in the machine frame at
+    /// home, where the spindle nose is the origin, m.
+    pub fn head(&self, pivot: Vector3<f64>) -> Vec<Visual> {
+        let nose = -pivot.z;
+        vec![cylinder(SPINDLE_RADIUS, nose, nose + SPINDLE_LENGTH, SPINDLE)]
+    }
+
     /// Returns the carriage on the rails of X, as long as the travel of Y.
-    pub fn x_slide(&self) -> Vec<Visual> {
+    fn x_slide(&self) -> Vec<Visual> {
         let rails = self.rails();
         let from = [-SLIDE, -self.half[1] - SLIDE, rails - SLIDE];
         vec![block(from, [SLIDE, self.column() + SLIDE, rails], SLIDES)]
     }
 
     /// Returns the head on the rails of Y.
-    pub fn y_slide(&self) -> Vec<Visual> {
+    fn y_slide(&self) -> Vec<Visual> {
         let bottom = self.rails() - 2.0 * SLIDE;
         vec![block([-SLIDE, -SLIDE, bottom], [SLIDE, SLIDE, bottom + SLIDE], SLIDES)]
     }
 
-    /// Returns quill and spindle; the origin of the frame is the spindle nose.
-    pub fn z_slide(&self) -> Vec<Visual> {
+    /// Returns quill and spindle, if it is there; the origin of the frame is the spindle nose.
+    fn z_slide(&self, has_spindle: bool) -> Vec<Visual> {
         let quill = SLIDE / 2.0;
         let (from, to) = (SPINDLE_LENGTH, SPINDLE_LENGTH + 2.0 * self.half[2] + SLIDE);
-        vec![
-            block([-quill, -quill, from], [quill, quill, to], SLIDES),
-            cylinder(SPINDLE_RADIUS, 0.0, SPINDLE_LENGTH, SPINDLE),
-        ]
+        let spindle = has_spindle.then(|| cylinder(SPINDLE_RADIUS, 0.0, SPINDLE_LENGTH, SPINDLE));
+        iter::once(block([-quill, -quill, from], [quill, quill, to], SLIDES)).chain(spindle).collect()
     }
 
     /// Returns the tool from the tip to the spindle nose; empty if the tool length is 0.

@@ -5,8 +5,8 @@ use std::io;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesText, Event};
 
-use super::UrdfError;
-use super::model::{Joint, Limit, Link, Model, Motion};
+use super::inertia::Inertia;
+use super::model::{Joint, Limit, Link, Model, Motion, UrdfError};
 use super::shapes::{Geometry, MATERIALS, Visual};
 
 type Xml<'a> = Writer<&'a mut Vec<u8>>;
@@ -41,10 +41,8 @@ fn document(xml: &mut Xml, model: &Model) -> io::Result<()> {
     xml.create_element("robot").with_attribute(("name", model.name.as_str())).write_inner_content(|xml| {
         for (name, color) in MATERIALS {
             let color = numbers(&color);
-            xml.create_element("material").with_attribute(("name", name)).write_inner_content(|xml| {
-                xml.create_element("color").with_attribute(("rgba", color.as_str())).write_empty()?;
-                Ok(())
-            })?;
+            let material = xml.create_element("material").with_attribute(("name", name));
+            material.write_inner_content(|xml| empty(xml, "color", &[("rgba", &color)]))?;
         }
         model.links.iter().try_for_each(|part| link(xml, part))?;
         model.joints.iter().try_for_each(|part| joint(xml, part))
@@ -58,29 +56,45 @@ fn link(xml: &mut Xml, link: &Link) -> io::Result<()> {
         element.write_empty()?;
         return Ok(());
     }
-    element.write_inner_content(|xml| link.visuals.iter().try_for_each(|part| visual(xml, part)))?;
+    element.write_inner_content(|xml| {
+        inertial(xml, &Inertia::of(&link.visuals))?;
+        for part in &link.visuals {
+            shape(xml, "visual", part)?;
+            shape(xml, "collision", part)?;
+        }
+        Ok(())
+    })?;
     Ok(())
 }
 
-fn visual(xml: &mut Xml, visual: &Visual) -> io::Result<()> {
-    xml.create_element("visual").write_inner_content(|xml| {
-        origin(xml, visual.origin, visual.rotation)?;
-        xml.create_element("geometry").write_inner_content(|xml| {
-            match visual.geometry {
-                Geometry::Box(edges) => xml
-                    .create_element("box")
-                    .with_attribute(("size", numbers(&edges).as_str()))
-                    .write_empty()?,
-                Geometry::Cylinder { radius, length } => xml
-                    .create_element("cylinder")
-                    .with_attribute(("radius", number(radius).as_str()))
-                    .with_attribute(("length", number(length).as_str()))
-                    .write_empty()?,
-            };
-            Ok(())
-        })?;
-        xml.create_element("material").with_attribute(("name", visual.material)).write_empty()?;
+fn inertial(xml: &mut Xml, Inertia { mass, center, tensor: [x, y, z] }: &Inertia) -> io::Result<()> {
+    xml.create_element("inertial").write_inner_content(|xml| {
+        origin(xml, *center, [0.0; 3])?;
+        xml.create_element("mass").with_attribute(("value", number(*mass).as_str())).write_empty()?;
+        let terms =
+            [("ixx", x[0]), ("ixy", x[1]), ("ixz", x[2]), ("iyy", y[1]), ("iyz", y[2]), ("izz", z[2])];
+        let terms = terms.map(|(name, value)| (name, number(value)));
+        let element = xml.create_element("inertia");
+        element.with_attributes(terms.iter().map(|(name, value)| (*name, value.as_str()))).write_empty()?;
         Ok(())
+    })?;
+    Ok(())
+}
+
+/// Writes a shape as the element `name`, `visual` or `collision`.
+fn shape(xml: &mut Xml, name: &str, shape: &Visual) -> io::Result<()> {
+    xml.create_element(name).write_inner_content(|xml| {
+        origin(xml, shape.origin, shape.rotation)?;
+        xml.create_element("geometry").write_inner_content(|xml| match shape.geometry {
+            Geometry::Box(edges) => empty(xml, "box", &[("size", &numbers(&edges))]),
+            Geometry::Cylinder { radius, length } => {
+                empty(xml, "cylinder", &[("radius", &number(radius)), ("length", &number(length))])
+            }
+        })?;
+        match name {
+            "visual" => empty(xml, "material", &[("name", shape.material)]),
+            _ => Ok(()),
+        }
     })?;
     Ok(())
 }
@@ -95,36 +109,30 @@ fn joint(xml: &mut Xml, joint: &Joint) -> io::Result<()> {
         .with_attribute(("type", kind))
         .write_inner_content(|xml| {
             origin(xml, joint.origin, [0.0; 3])?;
-            xml.create_element("parent").with_attribute(("link", joint.parent)).write_empty()?;
-            xml.create_element("child").with_attribute(("link", joint.child)).write_empty()?;
-            if let Motion::Moves { axis, limit: limits, .. } = &joint.motion {
-                xml.create_element("axis").with_attribute(("xyz", numbers(axis).as_str())).write_empty()?;
-                limit(xml, limits)?;
-            }
-            Ok(())
+            empty(xml, "parent", &[("link", joint.parent)])?;
+            empty(xml, "child", &[("link", joint.child)])?;
+            let Motion::Moves { axis, limit: limits, .. } = &joint.motion else { return Ok(()) };
+            empty(xml, "axis", &[("xyz", &numbers(axis))])?;
+            limit(xml, limits)
         })?;
     Ok(())
 }
 
 fn limit(xml: &mut Xml, limit: &Limit) -> io::Result<()> {
-    let mut element = xml.create_element("limit");
-    if let Some([lower, upper]) = limit.travel {
-        element = element
-            .with_attribute(("lower", number(lower).as_str()))
-            .with_attribute(("upper", number(upper).as_str()));
-    }
-    element
-        .with_attribute(("effort", number(limit.effort).as_str()))
-        .with_attribute(("velocity", number(limit.velocity).as_str()))
-        .write_empty()?;
-    Ok(())
+    let travel = limit.travel.into_iter().flat_map(|travel| ["lower", "upper"].into_iter().zip(travel));
+    let all = travel.chain([("effort", limit.effort), ("velocity", limit.velocity)]);
+    let all: Vec<(&str, String)> = all.map(|(name, value)| (name, number(value))).collect();
+    let attributes: Vec<(&str, &str)> = all.iter().map(|(name, value)| (*name, value.as_str())).collect();
+    empty(xml, "limit", &attributes)
 }
 
 fn origin(xml: &mut Xml, xyz: [f64; 3], rpy: [f64; 3]) -> io::Result<()> {
-    xml.create_element("origin")
-        .with_attribute(("xyz", numbers(&xyz).as_str()))
-        .with_attribute(("rpy", numbers(&rpy).as_str()))
-        .write_empty()?;
+    empty(xml, "origin", &[("xyz", &numbers(&xyz)), ("rpy", &numbers(&rpy))])
+}
+
+/// Writes an element without content.
+fn empty(xml: &mut Xml, name: &str, attributes: &[(&str, &str)]) -> io::Result<()> {
+    xml.create_element(name).with_attributes(attributes.iter().copied()).write_empty()?;
     Ok(())
 }
 

@@ -7,7 +7,9 @@ use mcap::{McapError, MessageStream, Summary};
 use proptest::prelude::*;
 use virtual_axes_core::config::QosConfig;
 use virtual_axes_io::files::{BoundedRecording, RecordedTopic};
-use virtual_axes_io::messages::Schema;
+use virtual_axes_io::messages::diagnostic_msgs::msg::DiagnosticArray;
+use virtual_axes_io::messages::sensor_msgs::msg::JointState;
+use virtual_axes_io::messages::{MotorCurrents, Recorded};
 
 const QOS: QosConfig = QosConfig { is_reliable: true, is_transient_local: false, depth: 10 };
 /// Message record without its data, bytes.
@@ -18,7 +20,7 @@ const MESSAGE: u64 = 31;
 const OVERHEAD: u64 = 16 + 53 + 128 + 3 * 15 + 107 + 26 + 3 * 10;
 
 fn topics() -> Vec<RecordedTopic> {
-    let schemas = [Schema::joint_state(), Schema::motor_currents(), Schema::diagnostic_array()];
+    let schemas = [JointState::schema(), MotorCurrents::schema(), DiagnosticArray::schema()];
     let topic = |(index, schema)| RecordedTopic { name: format!("/topic_{index}"), schema, qos: QOS };
     schemas.into_iter().enumerate().map(topic).collect()
 }

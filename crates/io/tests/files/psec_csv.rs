@@ -9,7 +9,7 @@ use virtual_axes_core::trajectory::{
     JointLimits, MotionId, Start, Timeline, Trajectory, TrajectoryPoint, TrajectoryRequest, ValidationContext,
 };
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
-use virtual_axes_io::files::{PsecCsvReader, PsecError};
+use virtual_axes_io::files::{FileError, PsecCsvReader};
 
 /// Tsp of the machine, ns.
 const TSP: Nanoseconds = 6_000_000;
@@ -19,12 +19,12 @@ fn limits() -> Vec<JointLimits> {
     joint_limits(&parameters.machine_config().expect("valid"), "")
 }
 
-fn open(text: &str) -> Result<PsecCsvReader<&[u8]>, PsecError> {
+fn open(text: &str) -> Result<PsecCsvReader<&[u8]>, FileError> {
     PsecCsvReader::new(text.as_bytes(), "p.csv", TSP, &limits())
 }
 
 /// Returns all rows, or the first error.
-fn rows(text: &str) -> Result<Vec<Vec<f64>>, PsecError> {
+fn rows(text: &str) -> Result<Vec<Vec<f64>>, FileError> {
     let mut psec = open(text)?;
     let mut row = vec![0.0; psec.joints().len()];
     let mut rows = Vec::new();

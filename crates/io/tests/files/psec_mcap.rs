@@ -10,7 +10,7 @@ use mcap::{Compression, WriteOptions};
 use proptest::prelude::*;
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_core::trajectory::Start;
-use virtual_axes_io::files::{McapTrajectories, PsecMcapWriter, TraceMcapWriter, TrajectoryRecordingError};
+use virtual_axes_io::files::{FileError, McapTrajectories, PsecMcapWriter, TraceMcapWriter};
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
 const TYPE: &str = "trajectory_msgs/msg/JointTrajectory";
@@ -70,15 +70,12 @@ fn options(compression: Option<Compression>) -> WriteOptions {
     WriteOptions::new().compression(compression).chunk_size(Some(200)).compression_threads(0)
 }
 
-fn open(
-    bytes: &[u8],
-    topic: Option<&str>,
-) -> Result<McapTrajectories<Cursor<Vec<u8>>>, TrajectoryRecordingError> {
+fn open(bytes: &[u8], topic: Option<&str>) -> Result<McapTrajectories<Cursor<Vec<u8>>>, FileError> {
     McapTrajectories::new(Cursor::new(bytes.to_vec()), "r.mcap", topic)
 }
 
 /// Returns log times and first positions.
-fn read(bytes: &[u8], topic: Option<&str>) -> Result<Vec<(i64, f64)>, TrajectoryRecordingError> {
+fn read(bytes: &[u8], topic: Option<&str>) -> Result<Vec<(i64, f64)>, FileError> {
     open(bytes, topic)?
         .map(|found| {
             let (time, request) = found?;

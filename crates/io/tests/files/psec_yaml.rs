@@ -91,6 +91,12 @@ fn errors_name_file_and_line() {
         error("joint_names: [x]\npoints: [{positions: [0], time_from_start: {nanosec: 1000000000}}]\n"),
         "p.yaml:2: point 0, time_from_start: nanosec is 1000000000, must be below 1000000000"
     );
+    assert_eq!(
+        error(
+            "joint_names: [x]\npoints:\n- {positions: [0]}\n- {positions: [0], time_from_start: {sec: 2147483647}}\n"
+        ),
+        "p.yaml:4: point 1: time_from_start is 2147483647 s, must be at most 360000 s (100 h)"
+    );
     for (text, line, words) in [
         ("joint_names: [x]\npoints:\n- {positions: [a]}\n", 3, &["a"][..]),
         ("joint_names: [x]\npoints:\n- {positions: [0.1}\n", 3, &["bracket"]),

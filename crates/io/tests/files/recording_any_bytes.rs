@@ -2,8 +2,7 @@
 
 use proptest::prelude::*;
 use virtual_axes_io::files::{
-    AxisRecordingError, Columns, RecordingFormat, RecordingOptions, inspect_recording_stream,
-    read_recording_stream,
+    Columns, FileError, RecordingFormat, RecordingOptions, inspect_recording_stream, read_recording_stream,
 };
 
 use super::recording_columns::axis;
@@ -48,7 +47,7 @@ const MEMORY_PER_BYTE: u64 = 1000;
 
 /// Reads and lists a recording; checks errors, memory and the channels of an accepted recording.
 fn check(bytes: &[u8], options: &RecordingOptions) -> Result<(), TestCaseError> {
-    let is_one_line = |error: &AxisRecordingError| {
+    let is_one_line = |error: &FileError| {
         let text = error.to_string();
         text.starts_with("r") && text.len() <= 2000 && !text.contains(char::is_control)
     };

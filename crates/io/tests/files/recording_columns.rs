@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use virtual_axes_core::config::{AxisConfig, MachineConfig, Parameters};
 use virtual_axes_identify::recording::{Finding, RawRecording};
 use virtual_axes_io::files::{
-    AxisRecordingError, Channel, Columns, FoundColumn, RecordingColumns, RecordingFormat, RecordingOptions,
+    Channel, Columns, FileError, FoundColumn, RecordingColumns, RecordingFormat, RecordingOptions,
     inspect_recording, read_recording,
 };
 use virtual_axes_verification::fixtures::folder::TestFolder;
@@ -18,7 +18,7 @@ pub(crate) fn axis(name: &str) -> &'static AxisConfig {
     MILL.axes().iter().find(|axis| axis.name() == name).expect("it has one")
 }
 
-pub(crate) type Outcome = Result<(RawRecording, Vec<Finding>), AxisRecordingError>;
+pub(crate) type Outcome = Result<(RawRecording, Vec<Finding>), FileError>;
 
 /// Recording in a folder of its own.
 pub(crate) struct Recorded {
@@ -387,9 +387,9 @@ fn names_of_formats_are_parsed() {
     for format in RecordingFormat::ALL {
         assert_eq!(format.name().parse(), Ok(format));
     }
-    let message = "half-sampler".parse::<RecordingFormat>().expect_err("unknown").to_string();
+    let message = "half-sampler".parse::<RecordingFormat>().expect_err("unknown");
     assert!(
-        message.starts_with("unknown format \"half-sampler\"; known are csv, ")
+        message.starts_with("unknown \"half-sampler\"; known are csv, ")
             && message.ends_with("; the nearest is halsampler"),
         "{message}"
     );

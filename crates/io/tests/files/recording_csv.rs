@@ -9,7 +9,8 @@ use virtual_axes_core::config::{AxisConfig, MachineConfig, Parameters};
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 use virtual_axes_io::files::{
-    AxisRecordingError, Columns, RecordingOptions, TraceCsvWriter, read_recording, read_recording_csv,
+    Columns, FileError, RecordingFormat, RecordingOptions, TraceCsvWriter, read_recording,
+    read_recording_stream,
 };
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
@@ -35,7 +36,18 @@ fn options(texts: &[&str]) -> RecordingOptions {
     RecordingOptions { columns, ..RecordingOptions::default() }
 }
 
-type Outcome = Result<(RawRecording, Vec<Finding>), AxisRecordingError>;
+type Outcome = Result<(RawRecording, Vec<Finding>), FileError>;
+
+/// Reads CSV whatever its content.
+fn read_recording_csv(
+    input: impl Read,
+    name: &str,
+    axis: &AxisConfig,
+    options: &RecordingOptions,
+) -> Outcome {
+    let options = RecordingOptions { format: Some(RecordingFormat::Csv), ..options.clone() };
+    read_recording_stream(input, name, axis, &options)
+}
 
 fn read(bytes: impl AsRef<[u8]>, texts: &[&str]) -> Outcome {
     read_recording_csv(bytes.as_ref(), "r.csv", axis(mill(), "x"), &options(texts))
@@ -54,7 +66,7 @@ fn error(bytes: impl AsRef<[u8]>, texts: &[&str]) -> String {
 }
 
 /// Returns the value of a channel of an axis, recorded as `number` in `unit`.
-fn value(axis: &AxisConfig, channel: &str, number: &str, unit: &str) -> Result<f64, AxisRecordingError> {
+fn value(axis: &AxisConfig, channel: &str, number: &str, unit: &str) -> Result<f64, FileError> {
     let mapping = format!("{channel}=it{unit}");
     let text = match channel {
         "time" => format!("it,position\n{number},0\n"),
@@ -200,7 +212,7 @@ fn invalid_mappings_are_rejected() {
     assert_eq!(
         message_of("positon=p"),
         "--column: unknown key \"positon\"; known are time, psec, position, velocity, current, \
-         velocity_feedforward, torque_feedforward, motor_position, wind_up, delimiter, decimal_comma, skip_lines; the nearest is position"
+         torque, velocity_feedforward, torque_feedforward, motor_position, wind_up, delimiter, decimal_comma, skip_lines; the nearest is position"
     );
     assert_eq!(message_of("time="), "--column: time=: the column is missing");
     for wrong in ["#0", "#", "#x", "#-1", "#1.5"] {

@@ -11,7 +11,7 @@ use virtual_axes_core::config::{AxisConfig, MachineConfig, Parameters};
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 use virtual_axes_io::files::{
-    AxisRecordingError, Columns, RecordingOptions, TraceMcapWriter, read_recording, read_recording_mcap,
+    Columns, FileError, RecordingOptions, TraceMcapWriter, read_recording, read_recording_mcap,
 };
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
@@ -114,7 +114,7 @@ fn record(entries: &[Entry<'_>]) -> Vec<u8> {
     writer.into_inner().into_inner()
 }
 
-type Outcome = Result<(RawRecording, Vec<Finding>), AxisRecordingError>;
+type Outcome = Result<(RawRecording, Vec<Finding>), FileError>;
 
 fn read_with(bytes: &[u8], options: &RecordingOptions) -> Outcome {
     read_recording_mcap(Cursor::new(bytes), "r.mcap", x(), options)
@@ -182,6 +182,7 @@ fn a_written_trace_is_read_back() {
         position: scaled(0.1),
         velocity: scaled(0.2),
         current: scaled(0.3),
+        torque: None,
         velocity_feedforward: scaled(0.4),
         torque_feedforward: scaled(0.5),
         motor_position: Some((0..5).map(|k| 0.1 * f64::from(k) + 0.25 * f64::from(k)).collect()),

@@ -126,7 +126,7 @@ fn the_columns_have_axes_with_names_and_numbers() {
             "velocity_feedforward [mm/s or deg/s of the axis] X1",
             "velocity_feedforward [mm/s or deg/s of the axis] Y1",
             "torque_feedforward [N.m] Y1",
-            "current [N.m] Y1",
+            "torque [N.m] Y1",
             "- Y1",
             "current [A] X1",
             "current [A] Y1",
@@ -146,8 +146,15 @@ fn the_axis_is_selected_by_its_name_or_number() {
     let psec = y.psec.expect("there");
     assert_close(&psec, &[0.451439545, 0.451537945, 0.451641145, 0.451749145, 0.454713145, 0.454917145]);
     assert_close(&y.position.expect("there")[..2], &[0.45109415, 0.451173584]);
-    // CURRENT, not TORQUE.
-    assert_close(&y.current.expect("there")[..2], &[-28.095703, -28.603271]);
+    let current = y.current.expect("there");
+    assert_close(&current[..2], &[-28.095703, -28.603271]);
+    // TORQUE beside CURRENT tells the torque constant; without it, it is the current.
+    let torque = y.torque.expect("there");
+    let without = EXCERPT.replace("\"CURRENT|2\"", "\"LOAD|2\"");
+    let without = Recorded::new("edge", without).good("y");
+    let constant = axis("y").motor.torque_constant;
+    assert_close(&without.current.expect("there")[..1], &[torque[0] / constant]);
+    assert!(without.torque.is_none());
     assert_eq!(y.torque_feedforward, Some(vec![0.0; 6]));
     // The velocity feedforward is the speed of the setpoint, in rad/s of the motor.
     let feedforward = y.velocity_feedforward.expect("there");

@@ -8,7 +8,7 @@ use super::error::Outcome;
 use super::limits::MAX_TURNS;
 use super::line_words::LineWords;
 use super::state::State;
-use crate::motion::{AXIS_LETTERS, Coordinates, MotionKind, PlanarArc};
+use crate::motion::{AXIS_LETTERS, Coordinates, PlanarArc};
 
 /// Letters of the arc center along X, Y and Z.
 const CENTERS: [char; 3] = ['I', 'J', 'K'];
@@ -29,24 +29,25 @@ impl State {
             return Err(format!("word P: {turns} turns, an integer from 1 to {MAX_TURNS} is required"));
         }
         let [first, second, _] = self.modal.plane.axes();
-        let has_end = block.has_any(&[AXIS_LETTERS[first], AXIS_LETTERS[second]]);
-        let end = self.targets(block, false)?;
+        let has_end = block.has_any(&[AXIS_LETTERS[first], AXIS_LETTERS[second]]) || block.polar != [None; 2];
+        let (start, end) = (self.programmed(), self.targets(block)?);
         let center = match block.take('R') {
             Some(_) if block.has_any(&CENTERS) => return Err("word R excludes I, J and K".to_owned()),
             Some(_) if !has_end => return Err("an arc with R requires an end point in its plane".to_owned()),
-            Some(radius) => self.center_by_radius(&end, radius * self.modal.length, is_clockwise)?,
-            None => self.center_by_words(block)?,
+            Some(radius) => {
+                center_by_radius([&start, &end], [first, second], radius * self.modal.length, is_clockwise)?
+            }
+            None => self.center_by_words(block, &start)?,
         };
-        let [from, to] =
-            [&self.position, &end].map(|point| [point[first] - center[0], point[second] - center[1]]);
+        let [from, to] = [&start, &end].map(|point| [point[first] - center[0], point[second] - center[1]]);
         require_radii(from, to)?;
         let angle = sweep(from, to, is_clockwise);
         let sweep = angle + TAU * (turns - 1.0) * angle.signum();
-        self.push_feed(MotionKind::Arc(PlanarArc { plane: self.modal.plane, center, sweep }), end)
+        self.arc_to(&PlanarArc { plane: self.modal.plane, center, sweep }, &end)
     }
 
     /// Returns the center by I, J, K, m.
-    fn center_by_words(&self, block: &mut LineWords) -> Outcome<[f64; 2]> {
+    fn center_by_words(&self, block: &mut LineWords, start: &Coordinates) -> Outcome<[f64; 2]> {
         let [first, second, normal] = self.modal.plane.axes();
         let letters = [CENTERS[first], CENTERS[second]];
         if block.get(CENTERS[normal]).is_some() {
@@ -63,41 +64,40 @@ impl State {
             return Err(format!("an arc requires R, or its center {one} {joint} {two}"));
         }
         let coordinate = |axis: usize, word: Option<f64>| {
-            let reference = if is_absolute { self.origin(axis) } else { self.position[axis] };
+            let reference = if is_absolute { 0.0 } else { start[axis] };
             reference + word.unwrap_or(0.0) * self.modal.length
         };
         Ok([coordinate(first, words[0]), coordinate(second, words[1])])
     }
+}
 
-    /// Returns the center by the radius, m; a negative radius selects the longer arc.
-    fn center_by_radius(&self, end: &Coordinates, radius: f64, is_clockwise: bool) -> Outcome<[f64; 2]> {
-        let [first, second, _] = self.modal.plane.axes();
-        let chord = [end[first] - self.position[first], end[second] - self.position[second]];
-        let half = 0.5 * chord[0].hypot(chord[1]);
-        if half < POINT {
-            return Err(
-                "an arc with R requires an end point that differs from its start; use I, J, K".to_owned()
-            );
-        }
-        if half - radius.abs() > RADIUS_TOLERANCE {
-            let [found, least] = [radius.abs(), half].map(|length| Rounded(length / MILLIMETER));
-            return Err(format!(
-                "word R: radius {found} mm does not reach the end point, at least {least} mm are required"
-            ));
-        }
-        let height = ((radius.abs() - half).max(0.0) * (radius.abs() + half)).sqrt();
-        // The center of a short arc is to the left of the chord if the arc turns to the left.
-        let side = if is_clockwise == (radius < 0.0) { 1.0 } else { -1.0 };
-        let scale = 0.5 * side * height / half;
-        Ok([
-            self.position[first] + 0.5 * chord[0] - scale * chord[1],
-            self.position[second] + 0.5 * chord[1] + scale * chord[0],
-        ])
+/// Returns the center by the radius, m; a negative radius selects the longer arc.
+pub(super) fn center_by_radius(
+    [start, end]: [&Coordinates; 2],
+    [first, second]: [usize; 2],
+    radius: f64,
+    is_clockwise: bool,
+) -> Outcome<[f64; 2]> {
+    let chord = [end[first] - start[first], end[second] - start[second]];
+    let half = 0.5 * chord[0].hypot(chord[1]);
+    if half < POINT {
+        return Err("an arc with R requires an end point that differs from its start; use I, J, K".to_owned());
     }
+    if half - radius.abs() > RADIUS_TOLERANCE {
+        let [found, least] = [radius.abs(), half].map(|length| Rounded(length / MILLIMETER));
+        return Err(format!(
+            "word R: radius {found} mm does not reach the end point, at least {least} mm are required"
+        ));
+    }
+    let height = ((radius.abs() - half).max(0.0) * (radius.abs() + half)).sqrt();
+    // The center of a short arc is to the left of the chord if the arc turns to the left.
+    let side = if is_clockwise == (radius < 0.0) { 1.0 } else { -1.0 };
+    let scale = 0.5 * side * height / half;
+    Ok([start[first] + 0.5 * chord[0] - scale * chord[1], start[second] + 0.5 * chord[1] + scale * chord[0]])
 }
 
 /// Rejects an arc without radius, or with different radii at start and end.
-fn require_radii(from: [f64; 2], to: [f64; 2]) -> Outcome<()> {
+pub(super) fn require_radii(from: [f64; 2], to: [f64; 2]) -> Outcome<()> {
     let [start, end] = [from, to].map(|[x, y]| x.hypot(y));
     if start < POINT || end < POINT {
         return Err("arc of radius 0: check the center".to_owned());
@@ -115,7 +115,7 @@ fn require_radii(from: [f64; 2], to: [f64; 2]) -> Outcome<()> {
 
 /// Returns the swept angle of at most one turn, rad; positive counterclockwise. `from` and `to` are relative to the
 /// center.
-fn sweep(from: [f64; 2], to: [f64; 2], is_clockwise: bool) -> f64 {
+pub(super) fn sweep(from: [f64; 2], to: [f64; 2], is_clockwise: bool) -> f64 {
     let direction = if is_clockwise { -1.0 } else { 1.0 };
     if (from[0] - to[0]).hypot(from[1] - to[1]) < POINT {
         return direction * TAU;

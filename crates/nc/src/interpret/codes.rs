@@ -1,130 +1,397 @@
-//! G and M codes with their modal groups.
+//! G and M codes: number, dialects, name and meaning, in modal groups of which a line has at most one code.
+//!
+//! Each group is an enum, so that the compiler points to the places where a new code must be executed. The same number
+//! may have another meaning in another dialect.
 
-use std::fmt::Write;
-
+use super::dialect::{ALL, Dialect, FANUC, GRBL, HAAS, LINUXCNC, MACH3};
 use super::error::Outcome;
-use super::line_words::LineWords;
 
-/// Modal group of a G code: one line has at most one code of each.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Group {
-    Motion,
-    NonModal,
-    Plane,
-    Distance,
-    ArcDistance,
-    FeedMode,
-    Units,
-    CutterCompensation,
-    ToolLength,
-    Coordinates,
-    PathControl,
-    Retract,
-    SpindleMode,
-}
+/// Dialects with codes of production controls.
+const FH: u8 = FANUC | HAAS;
+/// Dialects that share codes with these.
+const FHM: u8 = FH | MACH3;
+/// Dialects on the base of RS-274/NGC.
+const NGC: u8 = LINUXCNC | MACH3 | GRBL;
+/// Dialects except grbl.
+const CYCLES: u8 = LINUXCNC | FHM;
 
-/// Number of groups of G codes.
-const GROUPS: usize = Group::SpindleMode as usize + 1;
+/// Declares groups of codes: an enum for each, and a struct with the code of each group in a line.
+macro_rules! codes {
+    (
+        $(#[$doc:meta])* $codes:ident, $name:path;
+        $($field:ident: $group:ident, $group_doc:literal {
+            $($code:ident = $number:literal in $dialects:expr, $code_doc:literal;)+
+        })+
+    ) => {
+        $(#[doc = concat!($group_doc, ".")]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[repr(u16)]
+        pub(super) enum $group {
+            $(#[doc = concat!($code_doc, ".")] $code = $number,)+
+        }
 
-/// Supported G codes in tenths, with their groups.
-const G_CODES: [(Group, &[u16]); GROUPS] = [
-    (Group::Motion, &[0, 10, 20, 30, 50, 51, 52, 730, 800, 810, 820, 830, 850, 890]),
-    (Group::NonModal, &[40, 100, 280, 281, 300, 301, 520, 530, 920, 921, 922, 923]),
-    (Group::Plane, &[170, 180, 190]),
-    (Group::Distance, &[900, 910]),
-    (Group::ArcDistance, &[901, 911]),
-    (Group::FeedMode, &[930, 940, 950]),
-    (Group::Units, &[200, 210]),
-    (Group::CutterCompensation, &[400]),
-    (Group::ToolLength, &[430, 431, 434, 490]),
-    (Group::Coordinates, &[540, 550, 560, 570, 580, 590, 591, 592, 593]),
-    (Group::PathControl, &[610, 611, 640]),
-    (Group::Retract, &[980, 990]),
-    (Group::SpindleMode, &[970]),
-];
+        impl $group {
+            /// Returns the number; of a G code in tenths.
+            pub(super) fn number(self) -> u16 {
+                self as u16
+            }
+        })+
 
-/// Modal group of an M code.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum MGroup {
-    Stop,
-    Spindle,
-    ToolChange,
-    Coolant,
-    Subprogram,
-}
+        $(#[$doc])*
+        #[derive(Debug, Default)]
+        pub(super) struct $codes {
+            $(pub $field: Option<$group>,)+
+        }
 
-/// Number of groups of M codes.
-const M_GROUPS: usize = MGroup::Subprogram as usize + 1;
-
-/// Supported M codes with their groups.
-const M_CODES: [(MGroup, &[u32]); M_GROUPS] = [
-    (MGroup::Stop, &[0, 1, 2, 30]),
-    (MGroup::Spindle, &[3, 4, 5]),
-    (MGroup::ToolChange, &[6]),
-    (MGroup::Coolant, &[7, 8, 9]),
-    (MGroup::Subprogram, &[98, 99]),
-];
-
-/// Codes of one line by group.
-#[derive(Debug, Default)]
-pub(super) struct Codes {
-    g: [Option<u16>; GROUPS],
-    m: [Option<u32>; M_GROUPS],
-}
-
-impl Codes {
-    /// Sorts the codes of a line into their groups.
-    ///
-    /// # Errors
-    ///
-    /// A code that is not supported, or two codes of one group.
-    pub(super) fn new(block: &LineWords) -> Outcome<Self> {
-        let mut codes = Codes::default();
-        for &code in &block.g {
-            let group = G_CODES.iter().find(|(_, codes)| codes.contains(&code));
-            let Some((group, _)) = group else {
-                if code == 53 {
-                    return Err("G5.3 without G5.2".to_owned());
+        impl $codes {
+            /// Adds a code; returns false if the dialect lacks it.
+            fn add(&mut self, number: u16, dialect: Dialect) -> Outcome<bool> {
+                match number {
+                    $($($number if $dialects & dialect.bit() != 0 => {
+                        let other = self.$field.map($group::number);
+                        if is_in_effect(other, number, $name, dialect)? {
+                            self.$field = Some($group::$code);
+                        }
+                    })+)+
+                    _ => return Ok(false),
                 }
-                return Err(format!("{} is not supported; supported: {}", g_name(code), supported_g()));
-            };
-            let slot = &mut codes.g[*group as usize];
-            match *slot {
-                // Beside another motion code, G80 has no effect.
-                None | Some(800) => *slot = Some(code),
-                Some(_) if code == 800 => {}
-                Some(other) => {
-                    return Err(format!(
-                        "{} and {} exclude each other in one line",
-                        g_name(other),
-                        g_name(code)
-                    ));
+                Ok(true)
+            }
+
+            /// Returns the dialects that have a code, as bits.
+            fn dialects(number: u16) -> u8 {
+                match number {
+                    $($($number => $dialects,)+)+
+                    _ => 0,
                 }
             }
         }
-        for &code in &block.m {
-            let group = M_CODES.iter().find(|(_, codes)| codes.contains(&code));
-            let Some((group, _)) = group else {
-                let supported = supported_m();
-                return Err(format!(
-                    "M{code} is not supported and not in the list of ignored M codes; {supported}"
-                ));
-            };
-            if let Some(other) = codes.m[*group as usize].replace(code) {
-                return Err(format!("M{other} and M{code} exclude each other in one line"));
+    };
+}
+
+codes! {
+    /// G codes of one line. Their numbers are in tenths: 431 is G43.1.
+    GCodes, g_name;
+
+    motion: Motion, "Motion mode" {
+        Rapid = 0 in ALL, "G0: rapid traverse";
+        Line = 10 in ALL, "G1: straight line at feed";
+        ClockwiseArc = 20 in ALL, "G2: clockwise arc";
+        CounterclockwiseArc = 30 in ALL, "G3: counterclockwise arc";
+        CubicSpline = 50 in LINUXCNC, "G5: cubic spline";
+        QuadraticSpline = 51 in LINUXCNC, "G5.1: quadratic spline";
+        Nurbs = 52 in LINUXCNC, "G5.2: start of a NURBS";
+        NurbsEnd = 53 in LINUXCNC, "G5.3: end of a NURBS";
+        Synchronous = 330 in LINUXCNC, "G33: straight line with a pitch per revolution";
+        SynchronousTapping = 331 in LINUXCNC, "G33.1: tapping to a point and back";
+        ChipBreaking = 730 in CYCLES, "G73: deep-hole drilling with short retractions";
+        LeftTapping = 740 in CYCLES, "G74: left-hand tapping";
+        FineBoring = 760 in FHM, "G76: boring with a lateral shift before retraction";
+        BackBoring77 = 770 in HAAS, "G77: back boring from below";
+        Cancel = 800 in ALL, "G80: end of the motion mode";
+        Drilling = 810 in ALL, "G81: drilling";
+        DwellDrilling = 820 in ALL, "G82: drilling with dwell";
+        PeckDrilling = 830 in ALL, "G83: deep-hole drilling with retractions to the plane R";
+        Tapping = 840 in CYCLES, "G84: tapping";
+        Boring = 850 in CYCLES, "G85: boring with retraction at feed";
+        StopBoring = 860 in CYCLES, "G86: boring with spindle stop and retraction at rapid traverse";
+        BackBoring = 870 in FHM, "G87: back boring from below";
+        ManualBoring = 880 in FHM, "G88: boring with dwell, spindle stop and retraction";
+        DwellBoring = 890 in CYCLES, "G89: boring with dwell and retraction at feed";
+        LeftTapping174 = 1740 in HAAS, "G174: left-hand tapping";
+        Tapping184 = 1840 in HAAS, "G184: tapping";
+    }
+    action: Action, "Code that acts in its line only" {
+        Dwell = 40 in ALL, "G4: dwell";
+        ClockwisePocket = 120 in HAAS | MACH3, "G12: clockwise circular pocket";
+        CounterclockwisePocket = 130 in HAAS | MACH3, "G13: counterclockwise circular pocket";
+        Data = 100 in ALL, "G10: sets offsets and tools";
+        ReferenceCheck = 270 in FH, "G27: moves to a point";
+        ToReference = 280 in ALL, "G28: moves to the first reference";
+        StoreReference = 281 in NGC, "G28.1: stores the first reference";
+        FromReference = 290 in FH, "G29: moves through the point of the last G28";
+        ToSecondReference = 300 in ALL, "G30: moves to the second reference";
+        StoreSecondReference = 301 in NGC, "G30.1: stores the second reference";
+        Shift = 520 in ALL, "G52: shifts all coordinate systems";
+        MachineCoordinates = 530 in ALL, "G53: line in machine coordinates";
+        TiltTool = 531 in FH, "G53.1: turns the tool axis normal to the tilted plane";
+        MacroCall = 650 in FHM, "G65: calls a macro";
+        ShiftToPosition = 920 in ALL, "G92: shifts all coordinate systems to coordinates of the position";
+        ClearShift = 921 in ALL, "G92.1: clears the shift";
+        SuspendShift = 922 in NGC, "G92.2: suspends the shift";
+        RestoreShift = 923 in NGC, "G92.3: restores the shift";
+    }
+    modal_macro: ModalMacro, "Macro after each motion" {
+        Call = 660 in FH, "G66: calls a macro after each motion";
+        Cancel = 670 in FH, "G67: ends the calls";
+    }
+    plane: PlaneCode, "Plane of arcs and canned cycles" {
+        Xy = 170 in ALL, "G17"; Zx = 180 in ALL, "G18"; Yz = 190 in ALL, "G19";
+    }
+    distance: Distance, "Meaning of axis words" {
+        Absolute = 900 in ALL, "G90"; Incremental = 910 in ALL, "G91";
+    }
+    arc_distance: ArcDistance, "Meaning of the centers of arcs" {
+        Absolute = 901 in NGC, "G90.1"; Incremental = 911 in NGC, "G91.1";
+    }
+    feed_mode: FeedMode, "Meaning of the F word" {
+        InverseTime = 930 in ALL, "G93: inverse of the duration";
+        PerMinute = 940 in ALL, "G94: feed per minute";
+        PerRevolution = 950 in ALL, "G95: feed per revolution";
+    }
+    units: Units, "Length unit" {
+        Inch = 200 in ALL, "G20"; Millimeter = 210 in ALL, "G21";
+        Inch70 = 700 in MACH3 | GRBL, "G70"; Millimeter71 = 710 in MACH3 | GRBL, "G71";
+    }
+    cutter_compensation: CutterCompensation, "Cutter radius compensation" {
+        Off = 400 in ALL, "G40: none";
+        Left = 410 in ALL, "G41: tool left of the path";
+        LeftDiameter = 411 in LINUXCNC, "G41.1: tool left of the path, D is its diameter";
+        Right = 420 in ALL, "G42: tool right of the path";
+        RightDiameter = 421 in LINUXCNC, "G42.1: tool right of the path, D is its diameter";
+    }
+    tool_length: ToolLength, "Tool length" {
+        OfTool = 430 in ALL, "G43: length of a tool";
+        Given = 431 in LINUXCNC | GRBL | MACH3, "G43.1: given length";
+        Additional = 432 in LINUXCNC, "G43.2: adds the length of a tool";
+        CenterPoint = 434 in ALL, "G43.4: tool center point control";
+        CenterPointVector = 435 in FH, "G43.5: tool center point control with tool directions I J K";
+        Negative = 440 in FHM, "G44: negative length of a tool";
+        Off = 490 in ALL, "G49: no length";
+        CenterPoint234 = 2340 in HAAS, "G234: tool center point control";
+    }
+    coordinates: CoordinateSystem, "Work coordinate system" {
+        First = 540 in ALL, "G54"; Second = 550 in ALL, "G55"; Third = 560 in ALL, "G56";
+        Fourth = 570 in ALL, "G57"; Fifth = 580 in ALL, "G58"; Sixth = 590 in ALL, "G59";
+        Seventh = 591 in NGC, "G59.1"; Eighth = 592 in NGC, "G59.2"; Ninth = 593 in NGC, "G59.3";
+        Additional = 541 in FH, "G54.1 P: additional systems";
+        Additional154 = 1540 in HAAS, "G154 P: additional systems";
+    }
+    path_control: PathControlCode, "Path control" {
+        ExactPath = 610 in ALL, "G61: exact path";
+        ExactStop = 611 in NGC, "G61.1: exact stop";
+        Blend = 640 in ALL, "G64: blending";
+    }
+    exact_stop: ExactStop, "Exact stop of one line" {
+        Line = 90 in FH, "G9";
+    }
+    retraction: Retraction, "Retraction of canned cycles" {
+        ToInitial = 980 in ALL, "G98: to the position before the cycle";
+        ToPlane = 990 in ALL, "G99: to the plane R";
+    }
+    spindle_mode: SpindleMode, "Mode of the spindle" {
+        SurfaceSpeed = 960 in CYCLES, "G96: constant surface speed";
+        ConstantSpeed = 970 in CYCLES, "G97: constant speed";
+    }
+    polar: Polar, "Polar coordinates" {
+        Off = 150 in FHM, "G15: end of polar coordinates";
+        On = 160 in FHM, "G16: polar coordinates";
+    }
+    scaling: Scaling, "Scaling and mirroring" {
+        Off = 500 in FHM, "G50: end of scaling";
+        On = 510 in FHM, "G51: scaling";
+        MirrorOff = 501 in FH, "G50.1: end of mirroring";
+        Mirror = 511 in FH, "G51.1: mirroring";
+        MirrorOff100 = 1000 in HAAS, "G100: end of mirroring";
+        Mirror101 = 1010 in HAAS, "G101: mirroring";
+    }
+    rotation: Rotation, "Rotation of coordinates" {
+        On = 680 in FHM, "G68: rotation in the plane";
+        Tilted = 682 in FH, "G68.2: tilted plane";
+        ByTool = 683 in FH, "G68.3: plane normal to the tool axis";
+        Off = 690 in FHM, "G69: end of rotation and tilted plane";
+    }
+}
+
+codes! {
+    /// M codes of one line.
+    MCodes, m_name;
+
+    stop: Stop, "Stop" {
+        Program = 0 in ALL, "M0"; Optional = 1 in ALL, "M1"; End = 2 in ALL, "M2";
+        EndAndRewind = 30 in ALL, "M30"; Pallet = 60 in LINUXCNC, "M60";
+    }
+    spindle: Spindle, "Spindle" {
+        Clockwise = 3 in ALL, "M3"; Counterclockwise = 4 in ALL, "M4"; Off = 5 in ALL, "M5";
+    }
+    spindle_with_coolant: SpindleWithCoolant, "Spindle and coolant" {
+        Clockwise = 13 in FH, "M13"; Counterclockwise = 14 in FH, "M14";
+    }
+    tool_change: ToolChange, "Tool change" {
+        Change = 6 in ALL, "M6"; SetNumber = 61 in LINUXCNC, "M61";
+    }
+    coolant: Coolant, "Coolant" {
+        Mist = 7 in ALL, "M7"; Flood = 8 in ALL, "M8"; Off = 9 in ALL, "M9";
+    }
+    subprogram: Subprogram, "Subprogram by number" {
+        Call = 98 in ALL, "M98"; Return = 99 in ALL, "M99"; Local = 97 in HAAS, "M97";
+    }
+    kinematics: KinematicsSwitch, "Kinematics" {
+        CenterPoint = 428 in LINUXCNC, "M428: tool center point control";
+        Axes = 429 in LINUXCNC, "M429: positions of the axes"; User = 430 in LINUXCNC, "M430";
+    }
+    modes: SavedModes, "Saved modes" {
+        Save = 70 in LINUXCNC, "M70"; Discard = 71 in LINUXCNC, "M71"; Restore = 72 in LINUXCNC, "M72";
+        SaveForCall = 73 in LINUXCNC, "M73";
+    }
+}
+
+/// G codes without effect on the motion, in tenths: dialects and the letters of their words.
+const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
+    (50, FH, "PQRXYZABC"),
+    (51, FH, "PQRXYZABC"),
+    (70, LINUXCNC, ""),
+    (80, LINUXCNC, ""),
+    (80, FH, "P"),
+    (110, FH, ""),
+    (220, FH, "XYZIJK"),
+    (230, FH, ""),
+    (291, FH | NGC, ""),
+    (350, HAAS, ""),
+    (401, FH, ""),
+    (491, FH, ""),
+    (501, MACH3, ""),
+    (611, FH, ""),
+    (620, FH, ""),
+    (630, FH, ""),
+    (970, GRBL, ""),
+    (1030, HAAS, "P"),
+    (1070, HAAS, ""),
+    (1870, HAAS, "PEQ"),
+    (2540, HAAS, ""),
+    (2550, HAAS, ""),
+    (2910, FH, ""),
+];
+
+/// Codes that change the geometry and are known, with their remedies.
+const REMEDIES: &[(u16, &str)] = &[
+    (71, "cylindrical interpolation: program the motions of the axes"),
+    (121, "polar coordinate interpolation: program the motions of the axes"),
+    (310, "probing needs a workpiece: skip it with --ignore G31"),
+    (382, "probing needs a workpiece: skip it with --ignore G38.2"),
+    (383, "probing needs a workpiece: skip it with --ignore G38.3"),
+    (384, "probing needs a workpiece: skip it with --ignore G38.4"),
+    (385, "probing needs a workpiece: skip it with --ignore G38.5"),
+    (760, "threading on a lathe: no axis of the machine turns the workpiece"),
+    (1120, "polar coordinate interpolation: program the motions of the axes"),
+    (1410, "3D cutter compensation: program the offset path"),
+    (1430, "tool length along the tool axis: program G43.4 or G234"),
+    (1500, "pocket milling: let the CAM system output the motions"),
+];
+
+impl CoordinateSystem {
+    /// Returns the index in the work offsets; `None` for the additional systems.
+    pub(super) fn index(self) -> Option<usize> {
+        match self {
+            Self::First => Some(0),
+            Self::Second => Some(1),
+            Self::Third => Some(2),
+            Self::Fourth => Some(3),
+            Self::Fifth => Some(4),
+            Self::Sixth => Some(5),
+            Self::Seventh => Some(6),
+            Self::Eighth => Some(7),
+            Self::Ninth => Some(8),
+            Self::Additional | Self::Additional154 => None,
+        }
+    }
+}
+
+/// Codes of one line.
+#[derive(Debug, Default)]
+pub(super) struct Codes {
+    pub g: GCodes,
+    pub m: MCodes,
+    /// Codes without effect on the motion, and the letters of their words.
+    pub without_effect: Vec<(String, &'static str)>,
+    /// Codes that are not supported, and their remedies.
+    pub unsupported: Vec<(String, String)>,
+}
+
+impl Codes {
+    /// Sorts the codes of a line into their groups; G codes are in tenths.
+    ///
+    /// # Errors
+    ///
+    /// Two codes of one group, if the dialect does not allow them.
+    pub(super) fn new(g: &[u16], m: &[u32], dialect: Dialect) -> Outcome<Self> {
+        let mut codes = Codes::default();
+        for &code in g {
+            if code == Motion::NurbsEnd.number() && dialect == Dialect::LinuxCnc {
+                return Err("G5.3 without G5.2".to_owned());
+            }
+            if codes.g.add(code, dialect)? {
+                continue;
+            }
+            // G110 to G129 are the additional systems 1 to 20 of Haas.
+            if dialect == Dialect::Haas && matches!(code, 1100..=1290) && code % 10 == 0 {
+                codes.g.coordinates = Some(CoordinateSystem::Additional154);
+                continue;
+            }
+            let is_without_effect = |row: &&(u16, u8, &str)| row.0 == code && row.1 & dialect.bit() != 0;
+            match WITHOUT_EFFECT.iter().find(is_without_effect) {
+                Some((_, _, letters)) => codes.without_effect.push((g_name(code), letters)),
+                None => codes.unsupported.push((g_name(code), remedy(code, dialect))),
+            }
+        }
+        for &code in m {
+            let number = u16::try_from(code).unwrap_or(u16::MAX);
+            if codes.m.add(number, dialect)? {
+                continue;
+            }
+            match is_auxiliary(code, dialect) {
+                true => codes.without_effect.push((format!("M{code}"), "PQRSELIJK")),
+                false => codes.unsupported.push((format!("M{code}"), m_remedy(number))),
             }
         }
         Ok(codes)
     }
+}
 
-    /// Returns the G code of a group, in tenths.
-    pub(super) fn g(&self, group: Group) -> Option<u16> {
-        self.g[group as usize]
+/// Returns true for an auxiliary function of a machine builder or user, which moves no axis.
+fn is_auxiliary(code: u32, dialect: Dialect) -> bool {
+    let last = if dialect == Dialect::LinuxCnc { 199 } else { 9999 };
+    (10..=last).contains(&code) && !matches!(code, 96 | 97)
+}
+
+fn remedy(code: u16, dialect: Dialect) -> String {
+    if let Some((_, remedy)) = REMEDIES.iter().find(|(known, _)| *known == code) {
+        return (*remedy).to_owned();
     }
+    let without_effect = WITHOUT_EFFECT.iter().filter(|(known, ..)| *known == code);
+    let others = without_effect.fold(GCodes::dialects(code), |bits, (_, dialects, _)| bits | dialects);
+    let others: Vec<_> = Dialect::ALL
+        .into_iter()
+        .filter(|other| *other != dialect && *other != Dialect::Sinumerik && others & other.bit() != 0)
+        .map(Dialect::name)
+        .collect();
+    let name = g_name(code);
+    match others.is_empty() {
+        true => format!("skip it with --ignore {name} if it moves no axis"),
+        false => format!("known in --dialect {}; or skip it with --ignore {name}", others.join(" or ")),
+    }
+}
 
-    /// Returns the M code of a group.
-    pub(super) fn m(&self, group: MGroup) -> Option<u32> {
-        self.m[group as usize]
+fn m_remedy(code: u16) -> String {
+    match MCodes::dialects(code) {
+        0 => format!("skip it with --ignore M{code}"),
+        _ => format!("known in --dialect haas; or skip it with --ignore M{code}"),
+    }
+}
+
+/// Returns true if a code takes effect beside the `other` one of its group in the line. On most controls the last one does.
+///
+/// # Errors
+///
+/// Two codes that exclude each other.
+fn is_in_effect(other: Option<u16>, code: u16, name: fn(u16) -> String, dialect: Dialect) -> Outcome<bool> {
+    const CANCEL: u16 = Motion::Cancel as u16;
+    match other {
+        // Beside another motion code, G80 has no effect.
+        None | Some(CANCEL) => Ok(true),
+        Some(_) if code == CANCEL => Ok(false),
+        Some(_) if dialect != Dialect::LinuxCnc => Ok(true),
+        Some(other) => Err(format!("{} and {} exclude each other in one line", name(other), name(code))),
     }
 }
 
@@ -136,19 +403,7 @@ pub(super) fn g_name(code: u16) -> String {
     }
 }
 
-/// Returns the names of the supported G codes.
-fn supported_g() -> String {
-    let mut codes: Vec<u16> =
-        G_CODES.iter().flat_map(|(_, codes)| codes.iter().copied()).chain([53]).collect();
-    codes.sort_unstable();
-    codes.into_iter().map(g_name).collect::<Vec<_>>().join(" ")
-}
-
-/// Returns the supported M codes for a message.
-fn supported_m() -> String {
-    let mut text = "supported:".to_owned();
-    for code in M_CODES.iter().flat_map(|(_, codes)| codes.iter()) {
-        let _ = write!(text, " M{code}");
-    }
-    text
+/// Returns the name of an M code: `M30`.
+pub(super) fn m_name(code: u16) -> String {
+    format!("M{code}")
 }

@@ -1,50 +1,37 @@
-//! Canned cycles: G73, G81, G82, G83, G85, G89, with G98 and G99.
+//! Canned cycles: G73, G74, G76, G77, G81 to G89, G174, G184, with G98 and G99.
 
 use virtual_axes_core::units::MILLIMETER;
 
-use super::codes::g_name;
+use super::codes::{FeedMode, Motion, g_name};
+use super::dialect::Dialect;
 use super::error::Outcome;
-use super::execute::take_rate;
 use super::limits::MAX_PECKS;
 use super::line_words::LineWords;
-use super::state::{FeedMode, State};
-use crate::motion::{AXIS_COUNT, AXIS_LETTERS, MotionKind, PathControl, ProgramEvent};
+use super::state::{Cycle, State};
+use crate::motion::{AXIS_COUNT, AXIS_LETTERS, PathControl, ProgramEvent};
 
 /// Distance above the last depth to which a peck returns at rapid traverse, as in LinuxCNC, m.
 const CLEARANCE: f64 = 0.254 * MILLIMETER;
 
-/// Canned cycle with the words that stay in effect for its next lines.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Cycle {
-    /// G code, in tenths.
-    code: u16,
-    /// Position of the drilling axis before the first line of the cycle, m.
-    initial: f64,
-    /// Word R, m.
-    retract: Option<f64>,
-    /// Word of the depth, m.
-    bottom: Option<f64>,
-    /// Dwell P, s.
-    dwell: Option<f64>,
-    /// Peck Q, m.
-    peck: Option<f64>,
-}
-
-/// Positions of the drilling axis in one line of a cycle, m.
+/// Programmed coordinates of the drilling axis in one line of a cycle, m.
 struct Levels {
     retract: f64,
     bottom: f64,
-    /// Position after each hole.
+    /// Coordinate after each hole.
     clear: f64,
 }
 
 impl State {
-    /// Executes a line of the cycle `code`, in tenths.
-    pub(super) fn cycle(&mut self, block: &mut LineWords, code: u16) -> Outcome<()> {
+    /// Executes a line of the cycle `code`.
+    pub(super) fn cycle(&mut self, block: &mut LineWords, code: Motion) -> Outcome<()> {
+        self.finish_contour()?;
         let [first, second, drill] = self.modal.plane.axes();
-        let name = g_name(code);
+        let name = g_name(code.number());
+        let is_linuxcnc = self.dialect == Dialect::LinuxCnc;
         let others = (0..AXIS_COUNT).filter(|axis| ![first, second, drill].contains(axis));
-        if let Some(axis) = others.into_iter().find(|axis| block.get(AXIS_LETTERS[*axis]).is_some()) {
+        if let Some(axis) =
+            others.into_iter().find(|axis| is_linuxcnc && block.get(AXIS_LETTERS[*axis]).is_some())
+        {
             return Err(format!("word {}: {name} moves X, Y and Z only", AXIS_LETTERS[axis]));
         }
         if self.modal.feed_mode == FeedMode::InverseTime {
@@ -52,110 +39,264 @@ impl State {
         }
         let mut cycle = self.modal.cycle.filter(|cycle| cycle.code == code).unwrap_or(Cycle {
             code,
-            initial: self.position[drill],
+            initial: self.programmed()[drill],
             retract: None,
             bottom: None,
             dwell: None,
             peck: None,
+            extra: [None; 3],
         });
         let levels = self.read_cycle(block, &mut cycle)?;
-        let repeats = block.take_integer('L')?.unwrap_or(1);
-        let pecks = cycle
-            .peck
-            .filter(|_| matches!(code, 730 | 830))
-            .map_or(1.0, |peck| (levels.retract - levels.bottom) / peck);
-        if repeats == 0 {
-            return Err(format!("{name}: word L: 0 repetitions, must be 1 or more"));
-        }
-        let strokes = (f64::from(repeats) * pecks).ceil();
+        let pecks = pecks(&cycle, levels.retract - levels.bottom, is_linuxcnc);
+        let repeats = self.repetitions(block, &name)?;
+        let strokes = f64::from(repeats) * pecks.count;
         if strokes > MAX_PECKS {
             let what = if cycle.peck.is_some() { "pecks" } else { "repetitions" };
             return Err(format!("{name}: {strokes} {what} in one line; at most {MAX_PECKS} are allowed"));
         }
-        let step = self.targets(block, false)?;
-        let step = [first, second].map(|axis| step[axis] - self.position[axis]);
+        let (start, target) = (self.programmed(), self.targets(block)?);
         self.modal.cycle = Some(cycle);
 
-        let mut level = if self.modal.retracts_to_initial { cycle.initial } else { self.position[drill] };
-        if level < levels.retract {
+        let mut level = if self.modal.retracts_to_initial { cycle.initial } else { start[drill] };
+        let is_below = is_back_boring(code);
+        if level < levels.retract && !is_below {
             level = levels.retract;
-            self.rapid_to(drill, level)?;
+            if repeats > 0 {
+                self.rapid_along(drill, level)?;
+            }
         }
         let path_control = std::mem::replace(&mut self.modal.path_control, PathControl::ExactPath);
-        let levels =
-            Levels { clear: if self.modal.retracts_to_initial { level } else { levels.retract }, ..levels };
+        let returns = self.modal.retracts_to_initial || is_below;
+        let levels = Levels { clear: if returns { level } else { levels.retract }, ..levels };
         for repeat in 0..repeats {
-            let mut end = self.position;
+            let mut end = self.programmed();
             if repeat == 0 || self.modal.is_incremental {
-                end[first] += step[0];
-                end[second] += step[1];
+                for axis in (0..AXIS_COUNT).filter(|axis| *axis != drill) {
+                    end[axis] += target[axis] - start[axis];
+                }
             }
             end[drill] = if repeat == 0 { level } else { levels.clear };
-            self.push_rapid(end)?;
-            self.rapid_to(drill, levels.retract)?;
-            self.hole(&cycle, &levels, drill)?;
-            self.rapid_to(drill, levels.clear)?;
+            self.rapid_to(&end)?;
+            if is_below {
+                self.bore_from_below(&cycle, &levels, [first, drill])?;
+                continue;
+            }
+            self.rapid_along(drill, levels.retract)?;
+            self.hole(&cycle, &levels, &pecks, [first, drill])?;
+            self.rapid_along(drill, levels.clear)?;
         }
         self.modal.path_control = path_control;
         Ok(())
     }
 
+    /// Returns the number of holes of a line: word L, or K of Fanuc.
+    fn repetitions(&self, block: &mut LineWords, name: &str) -> Outcome<u32> {
+        let is_macro_b = self.dialect.has_macro_b();
+        let by_k = if self.dialect == Dialect::Fanuc { block.take_integer('K')? } else { None };
+        match block.take_integer('L')?.or(by_k) {
+            None => Ok(1),
+            // The cycle takes effect with the next line.
+            Some(0) if is_macro_b => Ok(0),
+            Some(0) => Err(format!("{name}: word L: 0 repetitions, must be 1 or more")),
+            Some(repeats) => Ok(repeats),
+        }
+    }
+
     /// Reads the words of a line into the cycle.
-    fn read_cycle(&self, block: &mut LineWords, cycle: &mut Cycle) -> Outcome<Levels> {
+    fn read_cycle(&mut self, block: &mut LineWords, cycle: &mut Cycle) -> Outcome<Levels> {
         let drill = self.modal.plane.axes()[2];
-        let (letter, length, name) = (AXIS_LETTERS[drill], self.modal.length, g_name(cycle.code));
-        let origin = self.origin(drill);
+        let (letter, length, name) = (AXIS_LETTERS[drill], self.modal.length, g_name(cycle.code.number()));
         let is_incremental = self.modal.is_incremental;
+        let is_linuxcnc = self.dialect == Dialect::LinuxCnc;
         cycle.retract = block.take('R').map(|retract| retract * length).or(cycle.retract);
-        let retract = cycle.retract.ok_or_else(|| format!("{name} requires R, the plane of retraction"))?;
-        let retract = retract + if is_incremental { cycle.initial } else { origin };
+        let base = if is_incremental { cycle.initial } else { 0.0 };
+        let retract = match cycle.retract {
+            Some(retract) => retract + base,
+            None if is_linuxcnc => return Err(format!("{name} requires R, the plane of retraction")),
+            None => cycle.initial,
+        };
         cycle.bottom = block.take(letter).map(|bottom| bottom * length).or(cycle.bottom);
         let bottom = cycle.bottom.ok_or_else(|| format!("{name} requires {letter}, the depth"))?;
-        let bottom = bottom + if is_incremental { retract } else { origin };
-        if retract < bottom {
+        let bottom = bottom + if is_incremental { retract } else { 0.0 };
+        if retract < bottom && !is_back_boring(cycle.code) {
             return Err(format!("{name}: the plane R is below the depth {letter}"));
         }
-        if matches!(cycle.code, 820 | 890) {
-            cycle.dwell = take_rate(block, 'P')?.or(cycle.dwell);
+        let has_dwell = matches!(
+            cycle.code,
+            Motion::DwellDrilling | Motion::DwellBoring | Motion::StopBoring | Motion::ManualBoring
+        );
+        if (has_dwell || !is_linuxcnc || is_tapping(cycle.code)) && block.get('P').is_some() {
+            cycle.dwell = self.dwell_time(block)?;
+        }
+        if is_linuxcnc && matches!(cycle.code, Motion::DwellDrilling | Motion::DwellBoring) {
             cycle.dwell.ok_or_else(|| format!("{name} requires P, the dwell in s"))?;
         }
-        if matches!(cycle.code, 730 | 830) {
+        if has_pecks(cycle.code) || !is_linuxcnc {
             cycle.peck =
-                take_rate(block, 'Q')?.filter(|peck| *peck > 0.0).map(|peck| peck * length).or(cycle.peck);
+                block.take_rate('Q')?.filter(|peck| *peck > 0.0).map(|peck| peck * length).or(cycle.peck);
+        }
+        if has_pecks(cycle.code) && is_linuxcnc {
             cycle.peck.ok_or_else(|| format!("{name} requires Q above 0, the depth of a peck"))?;
+        }
+        if !is_linuxcnc {
+            let last = if self.dialect == Dialect::Fanuc { 2 } else { 3 };
+            for (extra, letter) in cycle.extra.iter_mut().zip(['I', 'J', 'K']).take(last) {
+                *extra = block.take(letter).map(|value| value * length).or(*extra);
+            }
+            // Speed factor of tapping retraction.
+            if is_tapping(cycle.code) {
+                block.take('J');
+                block.take('E');
+            }
         }
         Ok(Levels { retract, bottom, clear: retract })
     }
 
     /// Appends one hole from the R plane to the depth, and what the cycle does at the depth.
-    fn hole(&mut self, cycle: &Cycle, levels: &Levels, drill: usize) -> Outcome<()> {
-        if let (730 | 830, Some(peck)) = (cycle.code, cycle.peck) {
+    fn hole(
+        &mut self,
+        cycle: &Cycle,
+        levels: &Levels,
+        pecks: &Pecks,
+        [lateral, drill]: [usize; 2],
+    ) -> Outcome<()> {
+        if pecks.count > 1.0 {
+            let mut peck = pecks.first;
             let mut depth = levels.retract - peck;
             while depth > levels.bottom {
-                self.feed_to(drill, depth)?;
-                if cycle.code == 830 {
-                    self.rapid_to(drill, levels.retract)?;
+                self.feed_along(drill, depth)?;
+                if cycle.code == Motion::PeckDrilling {
+                    self.rapid_along(drill, levels.retract)?;
                 }
-                self.rapid_to(drill, depth + CLEARANCE)?;
+                self.rapid_along(drill, depth + CLEARANCE)?;
+                peck = (peck - pecks.reduction).max(pecks.least);
                 depth -= peck;
             }
         }
-        self.feed_to(drill, levels.bottom)?;
+        self.feed_along(drill, levels.bottom)?;
         if let Some(dwell) = cycle.dwell {
             self.push_event(ProgramEvent::Dwell(dwell));
         }
-        if matches!(cycle.code, 850 | 890) { self.feed_to(drill, levels.retract) } else { Ok(()) }
+        match cycle.code {
+            Motion::Boring | Motion::DwellBoring => self.feed_along(drill, levels.retract),
+            code if is_tapping(code) => {
+                self.push_spindle(-1.0);
+                self.feed_along(drill, levels.retract)?;
+                self.push_spindle(1.0);
+                Ok(())
+            }
+            Motion::StopBoring | Motion::ManualBoring => {
+                self.push_spindle(0.0);
+                self.rapid_along(drill, levels.clear)?;
+                self.push_spindle(1.0);
+                Ok(())
+            }
+            Motion::FineBoring => {
+                self.push_spindle(0.0);
+                let shift = lateral_shift(cycle);
+                self.shift_laterally(shift, lateral)?;
+                self.rapid_along(drill, levels.clear)?;
+                self.shift_laterally(shift.map(|value| -value), lateral)?;
+                self.push_spindle(1.0);
+                Ok(())
+            }
+            _ => Ok(()),
+        }
     }
 
-    fn rapid_to(&mut self, axis: usize, value: f64) -> Outcome<()> {
-        let mut end = self.position;
-        end[axis] = value;
-        self.push_rapid(end)
+    /// Bores from R below the workpiece up to the depth: the tool passes the hole with a lateral shift.
+    fn bore_from_below(
+        &mut self,
+        cycle: &Cycle,
+        levels: &Levels,
+        [lateral, drill]: [usize; 2],
+    ) -> Outcome<()> {
+        let shift = lateral_shift(cycle);
+        self.push_spindle(0.0);
+        self.shift_laterally(shift, lateral)?;
+        self.rapid_along(drill, levels.retract)?;
+        self.shift_laterally(shift.map(|value| -value), lateral)?;
+        self.push_spindle(1.0);
+        self.feed_along(drill, levels.bottom)?;
+        if let Some(dwell) = cycle.dwell {
+            self.push_event(ProgramEvent::Dwell(dwell));
+        }
+        self.push_spindle(0.0);
+        self.shift_laterally(shift, lateral)?;
+        self.rapid_along(drill, levels.clear)?;
+        self.shift_laterally(shift.map(|value| -value), lateral)?;
+        self.push_spindle(1.0);
+        Ok(())
     }
 
-    fn feed_to(&mut self, axis: usize, value: f64) -> Outcome<()> {
-        let mut end = self.position;
-        end[axis] = value;
-        self.push_feed(MotionKind::Line, end)
+    /// Appends a rapid traverse by a distance along the first and second axis of the plane.
+    fn shift_laterally(&mut self, shift: [f64; 2], lateral: usize) -> Outcome<()> {
+        let mut end = self.programmed();
+        end[lateral] += shift[0];
+        let second = self.modal.plane.axes()[1];
+        end[second] += shift[1];
+        self.rapid_to(&end)
     }
+
+    fn rapid_along(&mut self, axis: usize, value: f64) -> Outcome<()> {
+        let mut end = self.programmed();
+        end[axis] = value;
+        self.rapid_to(&end)
+    }
+
+    fn feed_along(&mut self, axis: usize, value: f64) -> Outcome<()> {
+        let mut end = self.programmed();
+        end[axis] = value;
+        self.line_to(&end)
+    }
+}
+
+/// Pecks of a hole, m.
+struct Pecks {
+    count: f64,
+    first: f64,
+    /// Reduction from one peck to the next, and the least peck.
+    reduction: f64,
+    least: f64,
+}
+
+/// Returns the pecks of a hole by Q, or by I, J and K of Haas.
+fn pecks(cycle: &Cycle, depth: f64, is_linuxcnc: bool) -> Pecks {
+    let none = Pecks { count: 1.0, first: depth, reduction: 0.0, least: depth };
+    if !has_pecks(cycle.code) {
+        return none;
+    }
+    let [first, reduction, least] = cycle.extra;
+    match (first.filter(|first| *first > 0.0 && !is_linuxcnc), cycle.peck) {
+        (Some(first), _) => {
+            let least = least.filter(|least| *least > 0.0).unwrap_or(first);
+            let count = (depth / least.min(first)).ceil();
+            Pecks { count, first, reduction: reduction.unwrap_or(0.0).max(0.0), least }
+        }
+        (None, Some(peck)) => {
+            Pecks { count: (depth / peck).ceil(), first: peck, reduction: 0.0, least: peck }
+        }
+        (None, None) => none,
+    }
+}
+
+/// Returns the lateral shift of boring cycles by I and J, or by Q along the first axis of the plane.
+fn lateral_shift(cycle: &Cycle) -> [f64; 2] {
+    match cycle.extra {
+        [None, None, _] => [cycle.peck.unwrap_or(0.0), 0.0],
+        [first, second, _] => [first, second].map(|shift| shift.unwrap_or(0.0)),
+    }
+}
+
+/// Returns true if a cycle drills in pecks of Q.
+fn has_pecks(code: Motion) -> bool {
+    matches!(code, Motion::ChipBreaking | Motion::PeckDrilling)
+}
+
+fn is_tapping(code: Motion) -> bool {
+    matches!(code, Motion::Tapping | Motion::LeftTapping | Motion::Tapping184 | Motion::LeftTapping174)
+}
+
+fn is_back_boring(code: Motion) -> bool {
+    matches!(code, Motion::BackBoring | Motion::BackBoring77)
 }

@@ -1,37 +1,53 @@
-//! Execution of one line, in the order of LinuxCNC: feed, spindle, tool, coolant, dwell, plane, units, tool length,
-//! coordinate system, path control, distance mode, motion, stop.
+//! Execution of one line, in the order of LinuxCNC: feed, spindle, tool, coolant, dwell, plane, units, cutter compensation,
+//! tool length, coordinate system, path control, distance mode, motion, stop.
 
 use virtual_axes_core::units::{DEGREE, MILLIMETER, RPM};
 
-use super::codes::{Codes, Group, MGroup, g_name};
+use super::codes::{
+    Action, ArcDistance, Codes, Coolant, Distance, FeedMode, Motion, PathControlCode, PlaneCode, Retraction,
+    SavedModes, Spindle, SpindleMode, SpindleWithCoolant, Stop, ToolChange, ToolLength, Units, g_name,
+};
+use super::contour::Corner;
+use super::dialect::Dialect;
 use super::error::Outcome;
-use super::limits::MAX_RATE;
 use super::line_words::{LineWords, Setting};
-use super::state::{FeedMode, Jump, State};
-use crate::motion::{Blend, PathControl, Plane, ProgramEvent};
+use super::parameters::{FIRST_OF_CONTROL, FIRST_VARIABLE_OF_CONTROL};
+use super::state::{Modal, State};
+use crate::motion::{AXIS_COUNT, Blend, PathControl, Plane, ProgramEvent};
 
 /// Millimeters in an inch.
 const INCH: f64 = 25.4 * MILLIMETER;
+/// Dwell from which the other unit of P is likely, s.
+const LONG_DWELL: f64 = 100.0;
+/// Milliseconds in a second.
+const MILLISECOND: f64 = 1e-3;
+/// Letters that belong to codes which are not supported.
+const ALL_LETTERS: &str = "ABCDEHIJKLPQRUVWXYZ";
 
 impl State {
     /// Executes a line; its steps are appended to `steps`.
     pub(super) fn execute(&mut self, block: &mut LineWords) -> Outcome<()> {
-        for (target, value) in block.settings.drain(..) {
-            match target {
-                Setting::Number(number) => self.parameters.set_numbered(number, value)?,
-                Setting::Name(name) if self.is_of_control(&name) => {
-                    return Err(format!("#<{name}>: a value of the control, which cannot be set"));
-                }
-                Setting::Name(name) => self.parameters.set_named(&name, value)?,
-            }
-        }
+        self.set_parameters(block)?;
         if self.spline.is_some() && block.is_ignored() {
             return Ok(());
         }
         if self.spline.is_some() && !block.is_empty() {
             return self.spline_line(block);
         }
-        let codes = Codes::new(block)?;
+        self.moves_in_machine_coordinates = false;
+        let codes = Codes::new(&block.g, &block.m, self.dialect)?;
+        if self.request_macro(block, &codes)? {
+            return Ok(());
+        }
+        for (name, letters) in &codes.without_effect {
+            self.note_without_effect(name.clone());
+            if codes.g.motion.is_none() && codes.g.action.is_none() {
+                block.skip(letters);
+            }
+        }
+        for (name, remedy) in &codes.unsupported {
+            self.reject(format!("{name} is not supported in the dialect {}: {remedy}", self.dialect))?;
+        }
         self.set_feed(block, &codes)?;
         self.set_spindle_and_tool(block, &codes)?;
         if block.is_ignored() {
@@ -41,30 +57,73 @@ impl State {
         self.set_coolant(&codes);
         self.dwell(block, &codes)?;
         self.set_plane_and_units(&codes);
-        self.set_tool_length(block, &codes)?;
-        self.set_coordinate_system(&codes);
-        self.set_path_control(block, &codes)?;
         self.set_distance_modes(&codes);
-        self.act(block, &codes)?;
-        self.stop(&codes);
+        if !codes.unsupported.is_empty() {
+            block.skip(ALL_LETTERS);
+        }
+        self.set_frames(block, &codes)?;
+        self.set_compensation(block, &codes)?;
+        self.set_tool_length(block, &codes)?;
+        self.switch_kinematics(&codes)?;
+        self.set_coordinate_system(block, &codes)?;
+        self.set_path_control(block, &codes)?;
+        self.save_modes(&codes);
+        if let Some((letter, size)) = block.corner.take() {
+            let size = size * self.modal.length;
+            self.corner = Some(if letter == 'R' { Corner::Round(size) } else { Corner::Chamfer(size) });
+        }
+        let path_control = self.modal.path_control;
+        if codes.g.exact_stop.is_some() {
+            self.modal.path_control = PathControl::ExactStop;
+        }
+        let steps = self.steps.len();
+        let result = self.act(block, &codes);
+        self.modal.path_control = path_control;
+        result?;
+        self.corner = None;
+        if self.steps.len() > steps {
+            self.request_modal_macro();
+        }
+        self.stop(&codes)?;
         self.jump(block, &codes)?;
+        if self.dialect != Dialect::LinuxCnc {
+            // Offset numbers may stand anywhere.
+            block.skip("DH");
+        }
         block.require_used()
+    }
+
+    fn set_parameters(&mut self, block: &mut LineWords) -> Outcome<()> {
+        for (target, value) in block.settings.drain(..) {
+            match target {
+                Setting::Number(0) => return Err("#0 has no value and cannot be set".to_owned()),
+                Setting::Number(number)
+                    if self.dialect.has_macro_b() && number >= FIRST_VARIABLE_OF_CONTROL =>
+                {
+                    self.set_control_variable(number, value)?;
+                }
+                Setting::Number(number) if number >= FIRST_OF_CONTROL => {
+                    self.set_parameter_of_control(number, value)?;
+                }
+                Setting::Number(number) => self.parameters.set_numbered(number, value)?,
+                Setting::Name(name) if self.is_of_control(&name) => {
+                    return Err(format!("#<{name}>: a value of the control, which cannot be set"));
+                }
+                Setting::Name(name) => self.parameters.set_named(&name, value)?,
+            }
+        }
+        Ok(())
     }
 
     /// Sets feed mode and feed: G93, G94, G95, F.
     fn set_feed(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
-        let mode = match codes.g(Group::FeedMode) {
-            Some(930) => FeedMode::InverseTime,
-            Some(940) => FeedMode::PerMinute,
-            Some(950) => FeedMode::PerRevolution,
-            _ => self.modal.feed_mode,
-        };
+        let mode = codes.g.feed_mode.unwrap_or(self.modal.feed_mode);
         // A feed of another mode has no meaning, and G93 requires a feed in each line.
         if mode != self.modal.feed_mode || mode == FeedMode::InverseTime {
             (self.modal.feed_word, self.modal.feed) = (0.0, None);
         }
         self.modal.feed_mode = mode;
-        if let Some(feed) = take_rate(block, 'F')? {
+        if let Some(feed) = block.take_rate('F')? {
             let units = if mode == FeedMode::InverseTime { [1.0; 2] } else { [self.modal.length, DEGREE] };
             self.modal.feed_word = feed;
             self.modal.feed = (feed > 0.0).then(|| units.map(|unit| feed * unit));
@@ -72,73 +131,145 @@ impl State {
         Ok(())
     }
 
-    /// Sets spindle and tool: S, T, M6, M3, M4, M5, G97.
+    /// Sets spindle and tool: S, T, M6, M61, M3, M4, M5, M13, M14, G96, G97.
     fn set_spindle_and_tool(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
-        let speed = take_rate(block, 'S')?;
+        let mut speed = block.take_rate('S')?;
+        match codes.g.spindle_mode {
+            Some(SpindleMode::SurfaceSpeed) => {
+                self.modal.has_surface_speed = true;
+                self.assume("G96: the spindle keeps its speed, the surface speed has no effect".to_owned());
+                // D limits the speed, rpm.
+                speed = block.take_rate('D')?;
+            }
+            Some(SpindleMode::ConstantSpeed) => self.modal.has_surface_speed = false,
+            None if self.modal.has_surface_speed => speed = None,
+            None => {}
+        }
         self.modal.spindle_speed = speed.unwrap_or(self.modal.spindle_speed);
         if let Some(tool) = block.take_integer('T')? {
             self.modal.selected_tool = tool;
             self.push_event(ProgramEvent::ToolSelection(tool));
         }
-        if codes.m(MGroup::ToolChange).is_some() {
-            self.modal.tool = self.modal.selected_tool;
-            self.push_event(ProgramEvent::ToolChange(self.modal.tool));
+        match codes.m.tool_change {
+            Some(ToolChange::Change) => {
+                self.modal.tool = self.modal.selected_tool;
+                self.push_event(ProgramEvent::ToolChange(self.modal.tool));
+                self.push_pause(self.options.tool_change_time);
+            }
+            Some(ToolChange::SetNumber) => {
+                self.modal.tool =
+                    block.take_integer('Q')?.ok_or("M61 requires Q, the tool in the spindle")?;
+            }
+            None => {}
         }
-        let direction = match codes.m(MGroup::Spindle) {
-            Some(3) => Some(1.0),
-            Some(4) => Some(-1.0),
-            Some(_) => Some(0.0),
-            None => None,
+        let direction = match codes.m.spindle {
+            Some(Spindle::Clockwise) => Some(1.0),
+            Some(Spindle::Counterclockwise) => Some(-1.0),
+            Some(Spindle::Off) => Some(0.0),
+            None => codes.m.spindle_with_coolant.map(|code| match code {
+                SpindleWithCoolant::Clockwise => 1.0,
+                SpindleWithCoolant::Counterclockwise => -1.0,
+            }),
         };
         self.modal.spindle_direction = direction.unwrap_or(self.modal.spindle_direction);
         if direction.is_some() || (speed.is_some() && self.modal.spindle_direction != 0.0) {
-            let speed = self.modal.spindle_direction * self.modal.spindle_speed * RPM;
-            self.push_event(ProgramEvent::Spindle(speed));
+            self.push_spindle(1.0);
         }
         Ok(())
     }
 
+    /// Appends the spindle speed, with `sign` −1 against its direction and 0 for a stop.
+    pub(super) fn push_spindle(&mut self, sign: f64) {
+        let speed = self.modal.spindle_direction * self.modal.spindle_speed * RPM;
+        self.push_event(ProgramEvent::Spindle(sign * speed));
+        self.push_pause(self.options.spindle_time);
+    }
+
+    /// Appends a standstill for an auxiliary function, s.
+    fn push_pause(&mut self, time: f64) {
+        if time > 0.0 {
+            self.push_event(ProgramEvent::Dwell(time));
+        }
+    }
+
     fn set_coolant(&mut self, codes: &Codes) {
-        let Some(code) = codes.m(MGroup::Coolant) else { return };
-        self.modal.mist = code == 7 || (code == 8 && self.modal.mist);
-        self.modal.flood = code == 8 || (code == 7 && self.modal.flood);
+        let with_spindle = codes.m.spindle_with_coolant.map(|_| Coolant::Flood);
+        let Some(code) = codes.m.coolant.or(with_spindle) else { return };
+        let Modal { mist, flood, .. } = &mut self.modal;
+        match code {
+            Coolant::Mist => *mist = true,
+            Coolant::Flood => *flood = true,
+            Coolant::Off => (*mist, *flood) = (false, false),
+        }
         self.push_event(ProgramEvent::Coolant { mist: self.modal.mist, flood: self.modal.flood });
     }
 
     fn dwell(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
-        if codes.g(Group::NonModal) != Some(40) {
+        if codes.g.action != Some(Action::Dwell) {
             return Ok(());
         }
-        let time = take_rate(block, 'P')?.ok_or("G4 requires P, the dwell in s")?;
+        let time = self.dwell_time(block)?.ok_or("G4 requires P, the dwell in s")?;
         self.push_event(ProgramEvent::Dwell(time));
         Ok(())
     }
 
+    /// Returns the dwell of the words P, or X and U of other controls, s.
+    pub(super) fn dwell_time(&mut self, block: &mut LineWords) -> Outcome<Option<f64>> {
+        let is_ngc = matches!(self.dialect, Dialect::LinuxCnc | Dialect::Grbl);
+        if codes_of_seconds(block) && !is_ngc {
+            let time = block.take_rate('X')?;
+            return Ok(time.or(block.take_rate('U')?));
+        }
+        let has_point = block.has_point('P');
+        let Some(value) = block.take_rate('P')? else {
+            return if is_ngc { Ok(None) } else { Ok(Some(0.0)) };
+        };
+        let is_ms = match self.dialect {
+            Dialect::Fanuc | Dialect::Haas => !has_point,
+            _ => false,
+        };
+        if is_ms && !self.has_given_dialect {
+            self.assume(format!(
+                "dwell P is in ms, as in the dialect {}; in s it would be {value} s",
+                self.dialect
+            ));
+        } else if !is_ms && value >= LONG_DWELL {
+            self.assume(format!(
+                "dwell P{value} is {value} s, as in the dialect {}; in ms, as Fanuc has it, it would be {} s \
+                 (--dialect fanuc)",
+                self.dialect,
+                value * MILLISECOND
+            ));
+        }
+        Ok(Some(if is_ms { value * MILLISECOND } else { value }))
+    }
+
     fn set_plane_and_units(&mut self, codes: &Codes) {
-        match codes.g(Group::Plane) {
-            Some(170) => self.modal.plane = Plane::Xy,
-            Some(180) => self.modal.plane = Plane::Zx,
-            Some(_) => self.modal.plane = Plane::Yz,
+        match codes.g.plane {
+            Some(PlaneCode::Xy) => self.modal.plane = Plane::Xy,
+            Some(PlaneCode::Zx) => self.modal.plane = Plane::Zx,
+            Some(PlaneCode::Yz) => self.modal.plane = Plane::Yz,
             None => {}
         }
-        match codes.g(Group::Units) {
-            Some(200) => self.modal.length = INCH,
-            Some(_) => self.modal.length = MILLIMETER,
+        match codes.g.units {
+            Some(Units::Inch | Units::Inch70) => self.modal.length = INCH,
+            Some(Units::Millimeter | Units::Millimeter71) => self.modal.length = MILLIMETER,
             None => {}
         }
     }
 
     /// Sets path control: G61, G61.1, G64.
     fn set_path_control(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
-        let Some(code) = codes.g(Group::PathControl) else { return Ok(()) };
+        let Some(code) = codes.g.path_control else { return Ok(()) };
         self.modal.path_control = match code {
-            610 => PathControl::ExactPath,
-            611 => PathControl::ExactStop,
-            _ => {
+            PathControlCode::ExactPath => PathControl::ExactPath,
+            PathControlCode::ExactStop => PathControl::ExactStop,
+            PathControlCode::Blend if self.dialect.has_macro_b() => self.options.path_control,
+            PathControlCode::Blend => {
                 let length = self.modal.length;
                 let tolerance =
-                    take_rate(block, 'P')?.filter(|tolerance| *tolerance > 0.0).map(|p| p * length);
-                let merge_tolerance = take_rate(block, 'Q')?.map(|q| q * length);
+                    block.take_rate('P')?.filter(|tolerance| *tolerance > 0.0).map(|p| p * length);
+                let merge_tolerance = block.take_rate('Q')?.map(|q| q * length);
                 let rotary_tolerance = tolerance.map(|tolerance| tolerance / MILLIMETER * DEGREE);
                 PathControl::Blend(Blend { tolerance, rotary_tolerance, merge_tolerance })
             }
@@ -147,97 +278,124 @@ impl State {
     }
 
     fn set_distance_modes(&mut self, codes: &Codes) {
-        if let Some(code) = codes.g(Group::Distance) {
-            self.modal.is_incremental = code == 910;
-        }
-        if let Some(code) = codes.g(Group::ArcDistance) {
-            self.modal.has_absolute_centers = code == 901;
-        }
-        if let Some(code) = codes.g(Group::Retract) {
-            self.modal.retracts_to_initial = code == 980;
+        let Modal { is_incremental, has_absolute_centers, retracts_to_initial, .. } = &mut self.modal;
+        *is_incremental = codes.g.distance.map_or(*is_incremental, |code| code == Distance::Incremental);
+        *has_absolute_centers =
+            codes.g.arc_distance.map_or(*has_absolute_centers, |code| code == ArcDistance::Absolute);
+        *retracts_to_initial =
+            codes.g.retraction.map_or(*retracts_to_initial, |code| code == Retraction::ToInitial);
+    }
+
+    /// Saves, restores or discards the modes: M70 to M73.
+    fn save_modes(&mut self, codes: &Codes) {
+        match codes.m.modes {
+            Some(SavedModes::Save | SavedModes::SaveForCall) => {
+                self.saved_modes = Some(Box::new(self.modal.clone()));
+            }
+            Some(SavedModes::Discard) => self.saved_modes = None,
+            Some(SavedModes::Restore) => {
+                if let Some(saved) = self.saved_modes.take() {
+                    let (tool, selected_tool, tcp_length) =
+                        (self.modal.tool, self.modal.selected_tool, self.modal.tcp_length);
+                    self.modal = Modal { tool, selected_tool, tcp_length, ..*saved };
+                }
+            }
+            None => {}
         }
     }
 
     /// Executes the code that uses the axis words: a motion, a reference, an offset.
     fn act(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
-        let action = codes.g(Group::NonModal).filter(|code| !matches!(code, 40 | 530));
-        let motion = codes.g(Group::Motion);
-        let of_axes = action.filter(|code| matches!(code, 100 | 280 | 300 | 520 | 920));
-        let of_axes = of_axes.or(codes.g(Group::ToolLength).filter(|code| *code == 431));
-        // Post-processors write G0 G28 and G0 G30, where the motion is a rapid traverse anyway.
-        let is_plain = matches!((action, motion), (Some(280 | 300), Some(0)));
-        if let (Some(code), Some(motion), false) = (of_axes, motion, is_plain) {
-            let names = (g_name(code), g_name(motion));
-            return Err(format!(
-                "{} and {} both use the axis words: program them in two lines",
-                names.0, names.1
-            ));
+        let motion = codes.g.motion;
+        let is_given_length = codes.g.tool_length == Some(ToolLength::Given);
+        let of_axes = match codes.g.action {
+            Some(
+                code @ (Action::Data
+                | Action::ToReference
+                | Action::ToSecondReference
+                | Action::FromReference
+                | Action::ReferenceCheck
+                | Action::Shift
+                | Action::ShiftToPosition),
+            ) => Some(code.number()),
+            _ => is_given_length.then_some(ToolLength::Given.number()),
+        };
+        // Post-processors write G0 G28, where the motion is a rapid traverse anyway.
+        let is_plain = motion == Some(Motion::Rapid)
+            && (self.dialect != Dialect::LinuxCnc
+                || matches!(codes.g.action, Some(Action::ToReference | Action::ToSecondReference)));
+        let is_end = motion == Some(Motion::Cancel) && self.dialect != Dialect::LinuxCnc;
+        if let (Some(code), Some(motion), false) = (of_axes, motion, is_plain || is_end) {
+            let [code, motion] = [code, motion.number()].map(g_name);
+            return Err(format!("{code} and {motion} both use the axis words: program them in two lines"));
         }
-        if let Some(code) = action {
-            self.act_once(code, block)?;
+        let mut is_machine = false;
+        match codes.g.action {
+            None | Some(Action::Dwell | Action::MacroCall) => {}
+            Some(Action::MachineCoordinates) => is_machine = true,
+            Some(Action::Data) => self.set_data(block)?,
+            Some(Action::ToReference) => self.go_to_reference(block, 0)?,
+            Some(Action::ToSecondReference) => self.go_to_reference(block, 1)?,
+            Some(Action::ReferenceCheck) => {
+                let end = self.targets(block)?;
+                self.rapid_to(&end)?;
+            }
+            Some(Action::FromReference) => {
+                let between = self.modal.between;
+                self.rapid_to(&between)?;
+                let end = self.targets(block)?;
+                self.rapid_to(&end)?;
+            }
+            Some(Action::TiltTool) => self.tilt_tool(block)?,
+            Some(Action::ClockwisePocket) => self.circular_pocket(block, true)?,
+            Some(Action::CounterclockwisePocket) => self.circular_pocket(block, false)?,
+            Some(Action::StoreReference) => self.store_reference(0)?,
+            Some(Action::StoreSecondReference) => self.store_reference(1)?,
+            Some(Action::Shift) => self.shift(block, Action::Shift)?,
+            Some(Action::ShiftToPosition) => self.shift(block, Action::ShiftToPosition)?,
+            Some(Action::ClearShift) => {
+                if self.dialect.has_macro_b() {
+                    block.skip("XYZABCUVW");
+                }
+                self.offsets.shift = [0.0; AXIS_COUNT];
+                self.offsets.saved_shift = self.offsets.shift;
+            }
+            Some(Action::SuspendShift) => self.offsets.shift = [0.0; AXIS_COUNT],
+            Some(Action::RestoreShift) => self.offsets.shift = self.offsets.saved_shift,
         }
-        let is_machine = codes.g(Group::NonModal) == Some(530);
         if let Some(motion) = motion {
             if self.modal.motion != Some(motion) {
                 self.modal.cycle = None;
             }
-            self.modal.motion = (motion != 800).then_some(motion);
+            self.modal.motion = match (motion, self.dialect) {
+                (Motion::Cancel, Dialect::LinuxCnc) => None,
+                (Motion::Cancel, _) => Some(Motion::Rapid),
+                _ => Some(motion),
+            };
         }
         if of_axes.is_some() { Ok(()) } else { self.move_by(block, motion, is_machine) }
     }
 
-    /// Executes a code that acts in its line only.
-    fn act_once(&mut self, code: u16, block: &mut LineWords) -> Outcome<()> {
-        match code {
-            100 => self.set_offset_data(block),
-            280 => self.go_to_reference(block, 0),
-            300 => self.go_to_reference(block, 1),
-            281 => self.store_reference(0),
-            301 => self.store_reference(1),
-            520 | 920 => self.shift(block, code),
-            _ => {
-                self.change_shift(code);
-                Ok(())
-            }
-        }
-    }
-
-    fn stop(&mut self, codes: &Codes) {
-        match codes.m(MGroup::Stop) {
-            Some(0) => self.push_event(ProgramEvent::Stop),
-            Some(1) => self.push_event(ProgramEvent::OptionalStop),
-            Some(_) => self.end(),
+    fn stop(&mut self, codes: &Codes) -> Outcome<()> {
+        match codes.m.stop {
+            Some(Stop::Program | Stop::Pallet) => self.push_event(ProgramEvent::Stop),
+            Some(Stop::Optional) => self.push_event(ProgramEvent::OptionalStop),
+            Some(Stop::End | Stop::EndAndRewind) => self.end()?,
             None => {}
         }
-    }
-
-    /// Requests the call of a subprogram or the return from it: M98 P L, M99.
-    fn jump(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
-        self.jump = match codes.m(MGroup::Subprogram) {
-            Some(98) => {
-                let program =
-                    block.take_integer('P')?.ok_or("M98 requires P, the number of the subprogram")?;
-                Some(Jump::Call { program, times: block.take_integer('L')?.unwrap_or(1) })
-            }
-            Some(_) => Some(Jump::Return),
-            None => None,
-        };
         Ok(())
     }
 
     /// Ends the program.
-    pub(super) fn end(&mut self) {
-        self.push_event(ProgramEvent::End);
+    pub(super) fn end(&mut self) -> Outcome<()> {
         self.has_ended = true;
+        self.finish_contour()?;
+        self.push_event(ProgramEvent::End);
+        Ok(())
     }
 }
 
-/// Returns the value of a word that must be 0 or positive, which then counts as used.
-pub(super) fn take_rate(block: &mut LineWords, letter: char) -> Outcome<Option<f64>> {
-    match block.take(letter) {
-        Some(value) if !(0.0..=MAX_RATE).contains(&value) => {
-            Err(format!("word {letter}: {value} is invalid, must be between 0 and {MAX_RATE:e}"))
-        }
-        value => Ok(value),
-    }
+/// Returns true for a dwell in s by X or U.
+fn codes_of_seconds(block: &LineWords) -> bool {
+    block.has_any(&['X', 'U']) && block.get('P').is_none()
 }

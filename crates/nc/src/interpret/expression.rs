@@ -2,44 +2,63 @@
 
 use super::error::Outcome;
 use super::limits::{MAX_NAME, MAX_NESTING};
-use super::parameters::{Variables, parameter_number};
+use super::parameters::parameter_number;
+use super::state::State;
 
 /// Difference below which EQ and NE regard two values as equal, as LinuxCNC does.
 const EQUAL: f64 = 1e-4;
-/// Names of functions of one value in brackets.
-const FUNCTIONS: [&str; 12] =
-    ["abs", "acos", "asin", "cos", "exp", "fix", "fup", "ln", "round", "sin", "sqrt", "tan"];
+/// Function of one value in brackets.
+type Function = fn(f64) -> f64;
+/// Functions, with what a value outside of their range must be.
+const FUNCTIONS: [(&str, Function, &str); 12] = [
+    ("abs", f64::abs, ""),
+    ("acos", |x| x.acos().to_degrees(), "between -1 and 1"),
+    ("asin", |x| x.asin().to_degrees(), "between -1 and 1"),
+    ("cos", |x| x.to_radians().cos(), ""),
+    ("exp", f64::exp, ""),
+    ("fix", f64::floor, ""),
+    ("fup", f64::ceil, ""),
+    ("ln", |x| if x > 0.0 { x.ln() } else { f64::NAN }, "positive"),
+    ("round", f64::round, ""),
+    ("sin", |x| x.to_radians().sin(), ""),
+    ("sqrt", f64::sqrt, "0 or positive"),
+    ("tan", |x| x.to_radians().tan(), ""),
+];
 
+/// Operation on two values.
+type Operation = fn(f64, f64) -> f64;
 /// Operators with their precedence; longer names first.
-const OPERATORS: [(&str, u8); 15] = [
-    ("**", 5),
-    ("mod", 4),
-    ("and", 1),
-    ("xor", 1),
-    ("or", 1),
-    ("eq", 2),
-    ("ne", 2),
-    ("gt", 2),
-    ("ge", 2),
-    ("lt", 2),
-    ("le", 2),
-    ("*", 4),
-    ("/", 4),
-    ("+", 3),
-    ("-", 3),
+const OPERATORS: [(&str, u8, Operation); 15] = [
+    ("**", 5, f64::powf),
+    ("mod", 4, f64::rem_euclid),
+    ("and", 1, |left, right| f64::from(left != 0.0 && right != 0.0)),
+    ("xor", 1, |left, right| f64::from((left != 0.0) != (right != 0.0))),
+    ("or", 1, |left, right| f64::from(left != 0.0 || right != 0.0)),
+    ("eq", 2, |left, right| f64::from((left - right).abs() < EQUAL)),
+    ("ne", 2, |left, right| f64::from((left - right).abs() >= EQUAL)),
+    ("gt", 2, |left, right| f64::from(left > right)),
+    ("ge", 2, |left, right| f64::from(left >= right)),
+    ("lt", 2, |left, right| f64::from(left < right)),
+    ("le", 2, |left, right| f64::from(left <= right)),
+    ("*", 4, |left, right| left * right),
+    ("/", 4, |left, right| left / right),
+    ("+", 3, |left, right| left + right),
+    ("-", 3, |left, right| left - right),
 ];
 
 /// Scanner of a compact line.
-pub(super) struct Scanner<'a, V> {
+pub(super) struct Scanner<'a> {
     text: &'a [u8],
     at: usize,
     depth: usize,
-    variables: &'a V,
+    /// True after a number with a decimal point.
+    has_point: bool,
+    state: &'a State,
 }
 
-impl<'a, V: Variables> Scanner<'a, V> {
-    pub(super) fn new(text: &'a [u8], variables: &'a V) -> Self {
-        Self { text, at: 0, depth: 0, variables }
+impl<'a> Scanner<'a> {
+    pub(super) fn new(text: &'a [u8], state: &'a State) -> Self {
+        Self { text, at: 0, depth: 0, has_point: false, state }
     }
 
     /// Returns the next byte.
@@ -60,11 +79,48 @@ impl<'a, V: Variables> Scanner<'a, V> {
         String::from_utf8_lossy(&rest[..rest.len().min(40)]).to_uppercase()
     }
 
+    /// Returns the number of bytes that were read.
+    pub(super) fn position(&self) -> usize {
+        self.at
+    }
+
+    /// Returns true if the text continues with `word`.
+    pub(super) fn starts_with(&self, word: &str) -> bool {
+        self.text.get(self.at..).is_some_and(|rest| rest.starts_with(word.as_bytes()))
+    }
+
+    /// Returns true if no value follows: the line ends, or another word begins, which is no function with brackets.
+    pub(super) fn has_no_value(&self) -> bool {
+        let rest = self.text.get(self.at..).unwrap_or_default();
+        let letters = rest.iter().take_while(|byte| byte.is_ascii_alphabetic()).count();
+        rest.is_empty() || (letters > 0 && rest.get(letters) != Some(&b'['))
+    }
+
     /// Skips `word` if the text continues with it.
     pub(super) fn skip(&mut self, word: &str) -> bool {
-        let found = self.text.get(self.at..).is_some_and(|rest| rest.starts_with(word.as_bytes()));
+        let found = self.starts_with(word);
         self.at += if found { word.len() } else { 0 };
         found
+    }
+
+    /// Returns true if the last value of a word has a decimal point.
+    pub(super) fn has_point(&self) -> bool {
+        self.has_point
+    }
+
+    /// Reads the value of a word; `None` for a variable of macro B without value.
+    pub(super) fn word_value(&mut self) -> Outcome<Option<f64>> {
+        self.has_point = false;
+        Ok(Some(self.value()?).filter(|value| !value.is_nan()))
+    }
+
+    /// Reads the value of a setting; of macro B an expression without brackets.
+    pub(super) fn setting_value(&mut self) -> Outcome<f64> {
+        if self.has_macro_b() { self.operations(1) } else { self.value() }
+    }
+
+    fn has_macro_b(&self) -> bool {
+        self.state.dialect.has_macro_b()
     }
 
     /// Reads a value: number, parameter, expression in brackets or function, with an optional sign.
@@ -89,7 +145,8 @@ impl<'a, V: Variables> Scanner<'a, V> {
             _ => return Err(format!("{}: a number, parameter or expression is required", self.found())),
         };
         self.depth -= 1;
-        match value.is_finite() {
+        // A variable of macro B without value is NaN.
+        match value.is_finite() || (value.is_nan() && self.has_macro_b()) {
             true => Ok(value),
             false => Err("expression without finite value: check divisors and powers".to_owned()),
         }
@@ -113,6 +170,7 @@ impl<'a, V: Variables> Scanner<'a, V> {
         let number = str::from_utf8(digits).ok().and_then(|digits| digits.parse().ok());
         let number = number.ok_or_else(|| format!("{}: not a number", self.found()))?;
         self.at += digits.len();
+        self.has_point |= points > 0;
         Ok(number)
     }
 
@@ -135,26 +193,29 @@ impl<'a, V: Variables> Scanner<'a, V> {
     /// Reads values joined by operators of at least the given precedence, grouped from left to right.
     fn operations(&mut self, precedence: u8) -> Outcome<f64> {
         let mut left = self.value()?;
-        while let Some((operator, binding)) = self.operator()
+        while let Some((name, binding, operation)) = self.operator()
             && binding >= precedence
         {
-            self.at += operator.len();
+            self.at += name.len();
             let right = self.operations(binding + 1)?;
-            left = apply(operator, left, right)?;
+            left = match self.has_macro_b() {
+                true => apply_macro_b(name, operation, left, right)?,
+                false => apply(name, operation, left, right)?,
+            };
         }
         Ok(left)
     }
 
-    fn operator(&self) -> Option<(&'static str, u8)> {
+    fn operator(&self) -> Option<(&'static str, u8, Operation)> {
         let rest = self.text.get(self.at..)?;
-        OPERATORS.into_iter().find(|(name, _)| rest.starts_with(name.as_bytes()))
+        OPERATORS.into_iter().find(|(name, ..)| rest.starts_with(name.as_bytes()))
     }
 
     /// Reads a parameter `#5`, `#[…]` or `#<name>`.
     fn parameter(&mut self) -> Outcome<f64> {
         match self.target()? {
-            Target::Number(number) => self.variables.numbered(number),
-            Target::Name(name) => self.variables.named(name),
+            Target::Number(number) => self.state.numbered(number),
+            Target::Name(name) => self.state.named(name),
         }
     }
 
@@ -167,7 +228,7 @@ impl<'a, V: Variables> Scanner<'a, V> {
             return self.name().map(Target::Name);
         }
         let value = self.value()?;
-        parameter_number(value).map(Target::Number)
+        parameter_number(value, self.state.dialect).map(Target::Number)
     }
 
     /// Reads a name in angle brackets.
@@ -188,31 +249,73 @@ impl<'a, V: Variables> Scanner<'a, V> {
             return self.exists();
         }
         if self.skip("atan") {
-            let y = self.bracket()?;
-            if !self.skip("/") {
-                return Err("ATAN: a second value is required, ATAN[y]/[x]".to_owned());
-            }
-            return Ok(y.atan2(self.bracket()?).to_degrees());
+            return self.arc_tangent();
         }
-        let name = FUNCTIONS.into_iter().find(|name| self.skip(name));
-        let name = name.ok_or_else(|| {
+        if self.has_macro_b() && self.skip("pow") {
+            let [base, exponent] = self.two_values("POW")?;
+            return apply("**", f64::powf, base, exponent);
+        }
+        let found = FUNCTIONS.into_iter().find(|(name, ..)| self.skip(name));
+        let (name, function, range) = found.ok_or_else(|| {
             let rest = self.rest();
             let argument = rest.trim_start_matches(|letter: char| letter.is_ascii_alphabetic());
             if argument.starts_with('[') {
-                let known = FUNCTIONS.map(str::to_uppercase).join(" ");
+                let known = FUNCTIONS.map(|(name, ..)| name.to_uppercase()).join(" ");
                 return format!("{rest}: not a function; supported: ATAN EXISTS {known}");
             }
             let hint = if rest.starts_with('O') { "; is the letter O meant as zero?" } else { "" };
             format!("{rest}: not a number{hint}")
         })?;
-        call(name, self.bracket()?)
+        let value = self.bracket()?;
+        let function = match name {
+            "fix" if self.has_macro_b() => f64::trunc,
+            "fup" if self.has_macro_b() => |value: f64| value.abs().ceil().copysign(value),
+            _ => function,
+        };
+        match function(if value.is_nan() { 0.0 } else { value }) {
+            result if result.is_nan() => Err(format!("{}[{value}]: must be {range}", name.to_uppercase())),
+            result => Ok(result),
+        }
+    }
+
+    /// Reads `[y]/[x]`; of macro B also `[y,x]` and `[y/x]` alone.
+    fn arc_tangent(&mut self) -> Outcome<f64> {
+        let start = self.at;
+        let y = self.bracket();
+        if self.has_macro_b() && (y.is_err() || self.peek() != Some(b'/')) {
+            if let Ok(y) = y {
+                return Ok(y.atan().to_degrees());
+            }
+            self.at = start;
+            let [y, x] = self.two_values("ATAN")?;
+            return Ok(y.atan2(x).to_degrees());
+        }
+        let y = y?;
+        if !self.skip("/") {
+            return Err("ATAN: a second value is required, ATAN[y]/[x]".to_owned());
+        }
+        Ok(y.atan2(self.bracket()?).to_degrees())
+    }
+
+    /// Reads two values in brackets with a comma.
+    fn two_values(&mut self, name: &str) -> Outcome<[f64; 2]> {
+        let required = || format!("{name}: two values in brackets are required, {name}[a,b]");
+        if !self.skip("[") {
+            return Err(required());
+        }
+        let first = self.operations(1)?;
+        if !self.skip(",") {
+            return Err(required());
+        }
+        let second = self.operations(1)?;
+        if self.skip("]") { Ok([first, second]) } else { Err(required()) }
     }
 
     fn exists(&mut self) -> Outcome<f64> {
         let is_valid = self.skip("[") && self.skip("#") && self.peek() == Some(b'<');
         let name = if is_valid { Some(self.name()?) } else { None };
         match name {
-            Some(name) if self.skip("]") => Ok(f64::from(self.variables.is_defined(name))),
+            Some(name) if self.skip("]") => Ok(f64::from(self.state.is_defined(name))),
             _ => Err("EXISTS: a named parameter in brackets is required, EXISTS[#<name>]".to_owned()),
         }
     }
@@ -227,54 +330,40 @@ pub(super) enum Target<'a> {
     Name(&'a str),
 }
 
-/// Applies an operator.
-fn apply(operator: &str, left: f64, right: f64) -> Outcome<f64> {
-    let truth = |value: f64| value != 0.0;
-    let value = match operator {
-        "**" if left < 0.0 && right.fract() != 0.0 => {
-            return Err("power of a negative value with a fractional exponent".to_owned());
+/// Applies an operator of macro B: variables without value differ from 0 for EQ and NE only, and AND, OR and XOR act on
+/// the bits of integers.
+fn apply_macro_b(name: &str, operation: Operation, left: f64, right: f64) -> Outcome<f64> {
+    if left.is_nan() || right.is_nan() {
+        match name {
+            "eq" => return Ok(f64::from(left.is_nan() && right.is_nan())),
+            "ne" => return Ok(f64::from(left.is_nan() != right.is_nan())),
+            _ => {}
         }
-        "**" => left.powf(right),
-        "/" | "mod" if right == 0.0 => return Err("division by zero".to_owned()),
-        "*" => left * right,
-        "/" => left / right,
-        "mod" => left.rem_euclid(right),
-        "+" => left + right,
-        "-" => left - right,
-        "eq" => f64::from((left - right).abs() < EQUAL),
-        "ne" => f64::from((left - right).abs() >= EQUAL),
-        "gt" => f64::from(left > right),
-        "ge" => f64::from(left >= right),
-        "lt" => f64::from(left < right),
-        "le" => f64::from(left <= right),
-        "and" => f64::from(truth(left) && truth(right)),
-        "or" => f64::from(truth(left) || truth(right)),
-        _ => f64::from(truth(left) != truth(right)),
-    };
-    match value.is_finite() {
-        true => Ok(value),
-        false => Err(format!("{}: result is not finite", operator.to_uppercase())),
+    }
+    let [left, right] = [left, right].map(|value| if value.is_nan() { 0.0 } else { value });
+    let are_integers = left.fract() == 0.0 && right.fract() == 0.0 && left.abs().max(right.abs()) < 1e15;
+    let bits = (left as i64, right as i64);
+    match name {
+        "and" if are_integers => Ok((bits.0 & bits.1) as f64),
+        "or" if are_integers => Ok((bits.0 | bits.1) as f64),
+        "xor" if are_integers => Ok((bits.0 ^ bits.1) as f64),
+        "mod" if right != 0.0 => Ok(left % right),
+        _ => apply(name, operation, left, right),
     }
 }
 
-/// Applies a function of one value.
-fn call(name: &str, value: f64) -> Outcome<f64> {
-    let outside = |range: &str| Err(format!("{}[{value}]: must be {range}", name.to_uppercase()));
-    Ok(match name {
-        "acos" | "asin" if value.abs() > 1.0 => return outside("between -1 and 1"),
-        "ln" if value <= 0.0 => return outside("positive"),
-        "sqrt" if value < 0.0 => return outside("0 or positive"),
-        "abs" => value.abs(),
-        "acos" => value.acos().to_degrees(),
-        "asin" => value.asin().to_degrees(),
-        "cos" => value.to_radians().cos(),
-        "exp" => value.exp(),
-        "fix" => value.floor(),
-        "fup" => value.ceil(),
-        "ln" => value.ln(),
-        "round" => value.round(),
-        "sin" => value.to_radians().sin(),
-        "sqrt" => value.sqrt(),
-        _ => value.to_radians().tan(),
-    })
+/// Applies an operator.
+fn apply(name: &str, operation: Operation, left: f64, right: f64) -> Outcome<f64> {
+    match name {
+        "**" if left < 0.0 && right.fract() != 0.0 => {
+            return Err("power of a negative value with a fractional exponent".to_owned());
+        }
+        "/" | "mod" if right == 0.0 => return Err("division by zero".to_owned()),
+        _ => {}
+    }
+    let value = operation(left, right);
+    match value.is_finite() {
+        true => Ok(value),
+        false => Err(format!("{}: result is not finite", name.to_uppercase())),
+    }
 }

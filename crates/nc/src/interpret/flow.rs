@@ -4,56 +4,16 @@ use std::collections::HashMap;
 use std::io::{BufRead, Seek};
 
 use super::Interpreter;
+use super::dialect::Dialect;
 use super::error::Outcome;
 use super::expression::Scanner;
+use super::files::subprogram_file;
 use super::limits::{MAX_BLOCKS, MAX_CALLS, MAX_SUBPROGRAMS};
-use super::o_words::{Keyword, Statement, is_o_word};
-use super::parameters::{CallerScope, LOCALS, integer};
+use super::o_words::{BlockKind, Call, Flow, Keyword, OpenBlock, Statement, is_o_word};
+use super::parameters::{LOCALS, integer};
 use super::source::Place;
 use super::state::Jump;
 use super::text::LineText;
-
-/// Calls, loops and conditions that are open.
-#[derive(Debug, Default)]
-pub(super) struct Flow {
-    calls: Vec<Call>,
-    /// Loops and conditions of the main program.
-    blocks: Vec<OpenBlock>,
-    /// First line of each subprogram, once a call has required them.
-    subprograms: Option<HashMap<String, Place>>,
-}
-
-/// Subprogram that runs.
-#[derive(Debug)]
-struct Call {
-    label: String,
-    entry: Place,
-    return_to: Place,
-    /// Parameters of the caller; `None` after M98, which shares them.
-    scope: Option<CallerScope>,
-    /// Number of further runs (M98 L).
-    runs_left: u32,
-    blocks: Vec<OpenBlock>,
-}
-
-/// Loop or condition that is open.
-#[derive(Debug)]
-struct OpenBlock {
-    label: String,
-    kind: BlockKind,
-}
-
-/// Kind of an open block.
-#[derive(Debug, Clone, Copy)]
-enum BlockKind {
-    If,
-    /// Loop from its `while`.
-    While(Place),
-    /// Loop from the line after its `do`.
-    Do(Place),
-    /// Loop from the line after its `repeat`, with the number of further runs.
-    Repeat(Place, u32),
-}
 
 impl<R: BufRead + Seek> Interpreter<R> {
     /// Executes the O-word of the line at `place`.
@@ -117,19 +77,116 @@ impl<R: BufRead + Seek> Interpreter<R> {
     /// Executes the jump that a line has requested.
     pub(super) fn execute_jump(&mut self) -> Outcome<()> {
         match self.state.jump.take() {
-            None | Some(Jump::Call { times: 0, .. }) => Ok(()),
-            Some(Jump::Call { program, times }) => self.call(&program.to_string(), None, times),
-            Some(Jump::Return) => match self.flow.calls.last() {
-                Some(call) if call.scope.is_none() => self.finish_call(),
-                _ => Err("M99 outside of a subprogram that M98 has called".to_owned()),
+            None
+            | Some(
+                Jump::Call { times: 0, .. } | Jump::Local { times: 0, .. } | Jump::Macro { times: 0, .. },
+            ) => Ok(()),
+            Some(Jump::Call { program, times }) => {
+                let (program, times) = self.repeated_program(program, times)?;
+                self.call(&program.to_string(), None, times)
+            }
+            Some(Jump::Macro { program, times, arguments }) => {
+                self.call(&program.to_string(), Some(*arguments), times)
+            }
+            Some(Jump::Local { number, times }) => {
+                let entry = self.numbered_line(number)?;
+                let return_to = self.source.place();
+                self.enter(Call {
+                    label: format!("N{number}"),
+                    entry,
+                    section: self.section(),
+                    return_to,
+                    scope: None,
+                    is_by_number: true,
+                    runs_left: times - 1,
+                    blocks: Vec::new(),
+                })
+            }
+            Some(Jump::Goto { number }) => {
+                let place = self.numbered_line(number)?;
+                self.source.jump(place)
+            }
+            Some(Jump::Return { number }) => match self.flow.calls.last() {
+                Some(call) if call.is_by_number => {
+                    self.finish_call()?;
+                    match number {
+                        Some(number) => {
+                            let place = self.numbered_line(number)?;
+                            self.source.jump(place)
+                        }
+                        None => Ok(()),
+                    }
+                }
+                Some(_) => Err("M99 within a subprogram of an O-word call: program endsub".to_owned()),
+                None => {
+                    if let Some(number) = number {
+                        let place = self.numbered_line(number)?;
+                        return self.source.jump(place);
+                    }
+                    self.state.assume(
+                        "M99 in the main program repeats it without end: the simulation ends there"
+                            .to_owned(),
+                    );
+                    self.state.end()
+                }
             },
         }
+    }
+
+    /// Returns program and repetitions of M98 P: of Fanuc, digits before the last four are repetitions, if there is no
+    /// program with the whole number.
+    fn repeated_program(&mut self, program: u32, times: u32) -> Outcome<(u32, u32)> {
+        const PROGRAMS: u32 = 10_000;
+        let is_whole = self.state.dialect != Dialect::Fanuc
+            || program < PROGRAMS
+            || self.subprogram(&program.to_string()).is_ok();
+        Ok(if is_whole { (program, times) } else { (program % PROGRAMS, program / PROGRAMS) })
+    }
+
+    /// Returns the first line of the program or subprogram that runs.
+    fn section(&self) -> Place {
+        self.flow.calls.last().map_or(Place::START, |call| call.section)
+    }
+
+    /// Returns the place of a line by its number N, in the program or subprogram that runs.
+    fn numbered_line(&mut self, number: u32) -> Outcome<Place> {
+        let section = self.section();
+        if let Some(place) = self.flow.numbered.get(&(section, number)) {
+            return Ok(*place);
+        }
+        let here = self.source.place();
+        let mut line = LineText::default();
+        self.source.jump(section)?;
+        let mut is_first = true;
+        let found = loop {
+            let place = self.source.place();
+            if !self.source.read_raw(&mut line.raw)? {
+                break None;
+            }
+            if line.compact(self.state.dialect).is_err() {
+                continue;
+            }
+            if line.number == Some(number) {
+                break Some(place);
+            }
+            // The next program begins.
+            if !is_first && is_o_word(&line.text) {
+                break None;
+            }
+            is_first &= line.text.is_empty() || is_o_word(&line.text);
+        };
+        self.source.jump(here)?;
+        let place = found.ok_or_else(|| format!("N{number}: no such line in the program that runs"))?;
+        if self.flow.numbered.len() < MAX_SUBPROGRAMS {
+            self.flow.numbered.insert((section, number), place);
+        }
+        Ok(place)
     }
 
     /// Returns an error if loops, conditions or calls are open at the end of the file.
     pub(super) fn require_closed(&self) -> Outcome<()> {
         if let Some(call) = self.flow.calls.last() {
-            let end = if call.scope.is_some() { "endsub" } else { "M99" };
+            let end = if call.is_by_number { "M99" } else { "endsub" };
             return Err(format!("subprogram O{} without {end}", call.label));
         }
         match self.flow.blocks.last() {
@@ -291,7 +348,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
                 return Err(missing());
             }
             // Other lines are not executed, and may be incomplete.
-            let is_executed = self.line.compact().is_ok() && !self.is_skipped(&self.line);
+            let is_executed = self.line.compact(self.state.dialect).is_ok() && !self.is_skipped(&self.line);
             if !is_executed || !is_o_word(&self.line.text) {
                 continue;
             }
@@ -309,18 +366,23 @@ impl<R: BufRead + Seek> Interpreter<R> {
 
     /// Calls a subprogram with its own local parameters, or by M98 with those of the caller.
     fn call(&mut self, label: &str, arguments: Option<[f64; LOCALS]>, times: u32) -> Outcome<()> {
-        if self.flow.calls.len() >= MAX_CALLS {
-            return Err(format!("O{label}: subprograms call each other more than {MAX_CALLS} levels deep"));
-        }
         let entry = self.subprogram(label)?;
-        let call = Call {
-            label: label.to_owned(),
-            entry,
-            return_to: self.source.place(),
-            scope: arguments.map(|arguments| self.state.parameters.enter(&arguments)),
-            runs_left: times - 1,
-            blocks: Vec::new(),
-        };
+        let is_by_number = arguments.is_none() || self.state.dialect.has_macro_b();
+        if self.flow.calls.len() >= MAX_CALLS {
+            return Err(too_deep(label));
+        }
+        let return_to = self.source.place();
+        let scope = arguments.map(|arguments| self.state.parameters.enter(&arguments));
+        let (label, section, blocks) = (label.to_owned(), entry, Vec::new());
+        let runs_left = times - 1;
+        self.enter(Call { label, entry, section, return_to, scope, is_by_number, runs_left, blocks })
+    }
+
+    fn enter(&mut self, call: Call) -> Outcome<()> {
+        if self.flow.calls.len() >= MAX_CALLS {
+            return Err(too_deep(&call.label));
+        }
+        let entry = call.entry;
         self.flow.calls.push(call);
         self.state.calls = self.flow.calls.len();
         self.state.returned = None;
@@ -330,7 +392,8 @@ impl<R: BufRead + Seek> Interpreter<R> {
     /// Ends the subprogram with the label, if that is the one that runs.
     fn end_call(&mut self, label: &str, keyword: Keyword) -> Outcome<()> {
         match self.flow.calls.last() {
-            Some(call) if call.label == label => self.finish_call(),
+            // As in LinuxCNC, any return ends the subprogram that runs.
+            Some(call) if call.label == label || keyword == Keyword::Return => self.finish_call(),
             Some(call) => Err(format!("O{label} {} within subprogram O{}", keyword.name(), call.label)),
             None => Err(format!("O{label} {} outside of a subprogram", keyword.name())),
         }
@@ -356,17 +419,34 @@ impl<R: BufRead + Seek> Interpreter<R> {
     /// Returns the first line of a subprogram. The first call reads the whole file once.
     fn subprogram(&mut self, label: &str) -> Outcome<Place> {
         if self.flow.subprograms.is_none() {
-            self.flow.subprograms = Some(self.find_subprograms()?);
+            let found = self.find_subprograms(Place::START)?;
+            self.flow.subprograms = Some(found);
         }
-        let place = self.flow.subprograms.as_ref().and_then(|subprograms| subprograms.get(label)).copied();
-        place.ok_or_else(|| format!("O{label}: no such subprogram in this file"))
+        let known = |flow: &Flow| flow.subprograms.as_ref().and_then(|known| known.get(label)).copied();
+        if let Some(place) = known(&self.flow) {
+            return Ok(place);
+        }
+        let folder = self.state.options.subprogram_folder.as_deref();
+        let text = subprogram_file(folder, label)?;
+        let text = text.ok_or_else(|| {
+            format!("O{label}: no such subprogram in this file, and no file with its name beside it")
+        })?;
+        let start = self.source.add_file(text)?;
+        let mut found = self.find_subprograms(start)?;
+        // A file without the number of its program begins with its first line.
+        let place = *found.entry(label.to_owned()).or_insert(start);
+        let subprograms = self.flow.subprograms.get_or_insert_default();
+        for (label, place) in found {
+            subprograms.entry(label).or_insert(place);
+        }
+        Ok(place)
     }
 
-    fn find_subprograms(&mut self) -> Outcome<HashMap<String, Place>> {
+    fn find_subprograms(&mut self, start: Place) -> Outcome<HashMap<String, Place>> {
         let here = self.source.place();
         let mut found = HashMap::new();
         let mut line = LineText::default();
-        self.source.rewind()?;
+        self.source.jump(start)?;
         loop {
             let read = self.source.read_raw(&mut line.raw);
             if read.is_err() {
@@ -376,7 +456,11 @@ impl<R: BufRead + Seek> Interpreter<R> {
                 break;
             }
             let has_o = line.raw.iter().any(|byte| byte.eq_ignore_ascii_case(&b'o'));
-            if !has_o || line.compact().is_err() || self.is_skipped(&line) || !is_o_word(&line.text) {
+            if !has_o
+                || line.compact(self.state.dialect).is_err()
+                || self.is_skipped(&line)
+                || !is_o_word(&line.text)
+            {
                 continue;
             }
             let Ok(statement) = Scanner::new(&line.text, &self.state).statement() else { continue };
@@ -391,4 +475,8 @@ impl<R: BufRead + Seek> Interpreter<R> {
         self.source.jump(here)?;
         Ok(found)
     }
+}
+
+fn too_deep(label: &str) -> String {
+    format!("O{label}: subprograms call each other more than {MAX_CALLS} levels deep")
 }

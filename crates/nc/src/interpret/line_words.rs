@@ -1,10 +1,12 @@
 //! Words of one line.
 
 use super::codes::g_name;
+use super::dialect::Dialect;
 use super::error::Outcome;
 use super::expression::{Scanner, Target};
-use super::limits::MAX_CODES;
-use super::parameters::{Variables, integer};
+use super::limits::{MAX_CODES, MAX_RATE};
+use super::parameters::integer;
+use super::state::State;
 use crate::motion::AXIS_LETTERS;
 
 /// Number of letters.
@@ -14,14 +16,26 @@ const LETTERS: usize = 26;
 #[derive(Debug, Default)]
 pub(super) struct LineWords {
     values: [f64; LETTERS],
+    /// Bit of each letter with a word.
+    given: u32,
     /// Bit of each letter with a word that no code has used yet.
     unused: u32,
     /// G codes, in tenths.
     pub g: Vec<u16>,
     /// M codes, without the ignored ones.
     pub m: Vec<u32>,
-    /// Ignored M codes, whose words have no effect.
-    pub ignored: Vec<u32>,
+    /// Names of ignored codes, whose words have no effect.
+    pub ignored: Vec<String>,
+    /// True if the line has an ignored code.
+    pub is_ignored_line: bool,
+    /// Corner `,R` or `,C` with its value.
+    pub corner: Option<(char, f64)>,
+    /// Polar coordinates `@` (radius) and `^` (angle) of LinuxCNC.
+    pub polar: [Option<f64>; 2],
+    /// Bit of each letter whose number has a decimal point.
+    points: u32,
+    /// True if letters are arguments of a macro: G65, G66.
+    is_macro: bool,
     /// Parameter settings, in their order.
     pub settings: Vec<(Setting, f64)>,
 }
@@ -37,24 +51,38 @@ pub(super) enum Setting {
 
 impl LineWords {
     /// Reads a compact line.
-    pub(super) fn read<V: Variables>(&mut self, text: &[u8], variables: &V, ignored: &[u32]) -> Outcome<()> {
-        self.unused = 0;
+    pub(super) fn read(&mut self, text: &[u8], state: &State) -> Outcome<()> {
+        (self.given, self.unused, self.points, self.corner, self.is_macro) = (0, 0, 0, None, false);
+        self.polar = [None; 2];
         self.g.clear();
         self.m.clear();
         self.settings.clear();
         self.ignored.clear();
-        let mut scanner = Scanner::new(text, variables);
+        self.is_ignored_line = false;
+        let mut scanner = Scanner::new(text, state);
         while let Some(byte) = scanner.peek() {
             match byte {
                 b'#' => self.read_setting(&mut scanner)?,
-                b'a'..=b'z' => self.read_word(&mut scanner, ignored)?,
+                b'a'..=b'z' => self.read_word(&mut scanner, state)?,
+                b'@' | b'^' if state.dialect == Dialect::LinuxCnc => {
+                    scanner.take();
+                    self.polar[usize::from(byte == b'^')] = Some(scanner.value()?);
+                }
+                // Number of a spindle.
+                b'$' if state.dialect == Dialect::LinuxCnc => {
+                    scanner.take();
+                    scanner.value()?;
+                }
+                b',' if state.dialect.has_macro_b() => self.read_corner(&mut scanner)?,
+                // The rest after an optional stop within a line.
+                b'/' if state.dialect != Dialect::LinuxCnc => break,
                 _ => return Err(format!("{}: a word is required, a letter with a value", scanner.rest())),
             }
         }
         Ok(())
     }
 
-    fn read_setting<V: Variables>(&mut self, scanner: &mut Scanner<'_, V>) -> Outcome<()> {
+    fn read_setting(&mut self, scanner: &mut Scanner<'_>) -> Outcome<()> {
         let target = match scanner.target()? {
             Target::Number(number) => Setting::Number(number),
             Target::Name(name) => Setting::Name(name.to_owned()),
@@ -62,45 +90,96 @@ impl LineWords {
         if !scanner.skip("=") {
             return Err(format!("{}: a parameter setting requires =", scanner.found()));
         }
-        let value = scanner.value()?;
+        let value = scanner.setting_value()?;
         require_count(self.settings.len(), "parameter settings")?;
         self.settings.push((target, value));
         Ok(())
     }
 
-    fn read_word<V: Variables>(&mut self, scanner: &mut Scanner<'_, V>, ignored: &[u32]) -> Outcome<()> {
+    /// Reads `,R5` or `,C2`.
+    fn read_corner(&mut self, scanner: &mut Scanner<'_>) -> Outcome<()> {
+        let text = scanner.rest();
+        scanner.take();
+        let letter = scanner.take().map(|letter| char::from(letter.to_ascii_uppercase()));
+        let letter = letter.filter(|letter| matches!(letter, 'R' | 'C'));
+        let letter = letter.ok_or_else(|| format!("{text}: only ,R and ,C are supported after a comma"))?;
+        self.corner = Some((letter, scanner.value()?));
+        Ok(())
+    }
+
+    fn read_word(&mut self, scanner: &mut Scanner<'_>, state: &State) -> Outcome<()> {
+        let ignored = &state.options.ignored;
         let word = scanner.rest();
         let letter = scanner.take().unwrap_or_default();
+        if state.dialect != Dialect::LinuxCnc && b"xyzabc".contains(&letter) && scanner.has_no_value() {
+            // A letter alone, as in G28 X.
+            self.given |= 1 << index(letter);
+            return Ok(());
+        }
         let value = scanner
-            .value()
+            .word_value()
             .map_err(|reason| format!("word {}: {reason}", char::from(letter.to_ascii_uppercase())))?;
+        // A word with a parameter without value has no effect.
+        let Some(value) = value else { return Ok(()) };
         match letter {
             b'g' => {
                 require_count(self.g.len(), "G codes")?;
                 let code = integer(value * 10.0)
                     .and_then(|code| u16::try_from(code).ok())
                     .filter(|code| *code < 10_000);
-                self.g.push(code.ok_or_else(|| format!("G{value} is not a G code"))?);
+                let code = code.ok_or_else(|| format!("G{value} is not a G code"))?;
+                if ignored.has_g(code) {
+                    self.ignored.push(g_name(code));
+                } else {
+                    self.is_macro |= state.dialect.has_macro_b() && matches!(code, 650 | 660);
+                    self.g.push(code);
+                }
             }
-            b'm' => {
+            b'm' if !self.is_macro => {
                 let code = integer(value).ok_or_else(|| format!("M{value} is not an M code"))?;
                 require_count(self.m.len() + self.ignored.len(), "M codes")?;
-                let codes = if ignored.contains(&code) { &mut self.ignored } else { &mut self.m };
-                codes.push(code);
+                match ignored.has_m(code) {
+                    true => self.ignored.push(format!("M{code}")),
+                    false => self.m.push(code),
+                }
             }
-            b'n' => return Err("word N: the line number stands at the start of the line".to_owned()),
+            b'n' if state.dialect == Dialect::LinuxCnc => {
+                return Err("word N: the line number stands at the start of the line".to_owned());
+            }
             b'o' => return Err(format!("{word}: an O-word stands at the start of the line")),
-            b'e' => return Err(format!("{word}: the letter E is not supported; numbers have no exponent")),
+            // Analog outputs of LinuxCNC have the word E.
+            b'e' if !state.dialect.has_macro_b() && !self.m.iter().any(|code| matches!(code, 66..=68)) => {
+                return Err(format!("{word}: the letter E is not supported; numbers have no exponent"));
+            }
             _ => {
                 let bit = 1 << index(letter);
-                if self.unused & bit != 0 {
+                if self.unused & bit != 0 && state.dialect == Dialect::LinuxCnc {
                     return Err(format!("two words {} in one line", char::from(letter.to_ascii_uppercase())));
                 }
+                self.given |= bit;
                 self.unused |= bit;
+                self.points |= if scanner.has_point() { bit } else { 0 };
                 self.values[index(letter)] = value;
             }
         }
         Ok(())
+    }
+
+    /// Returns true if the number of a word has a decimal point. `letter` is in upper case.
+    pub(super) fn has_point(&self, letter: char) -> bool {
+        self.points & (1 << index(letter as u8)) != 0
+    }
+
+    /// Returns true if the line has a word, used or not. `letter` is in upper case.
+    pub(super) fn was_given(&self, letter: char) -> bool {
+        self.given & (1 << index(letter as u8)) != 0
+    }
+
+    /// Marks words as used. Letters are in upper case.
+    pub(super) fn skip(&mut self, letters: &str) {
+        for letter in letters.chars() {
+            self.take(letter);
+        }
     }
 
     /// Returns the value of a word, which then counts as used. `letter` is in upper case.
@@ -108,6 +187,16 @@ impl LineWords {
         let value = self.get(letter);
         self.unused &= !(1 << index(letter as u8));
         value
+    }
+
+    /// Returns the value of a word that must be 0 or positive, which then counts as used.
+    pub(super) fn take_rate(&mut self, letter: char) -> Outcome<Option<f64>> {
+        match self.take(letter) {
+            Some(value) if !(0.0..=MAX_RATE).contains(&value) => {
+                Err(format!("word {letter}: {value} is invalid, must be between 0 and {MAX_RATE:e}"))
+            }
+            value => Ok(value),
+        }
     }
 
     /// Returns the value of a word that is not used yet. `letter` is in upper case.
@@ -130,22 +219,26 @@ impl LineWords {
 
     /// Returns true if an axis has a word that is not used yet.
     pub(super) fn has_axis(&self) -> bool {
-        self.has_any(&AXIS_LETTERS)
+        self.has_any(&AXIS_LETTERS) || self.polar != [None; 2]
     }
 
     /// Returns true without word, code and setting.
     pub(super) fn is_empty(&self) -> bool {
-        self.unused == 0 && self.g.is_empty() && self.m.is_empty() && self.settings.is_empty()
+        self.unused == 0
+            && self.corner.is_none()
+            && self.g.is_empty()
+            && self.m.is_empty()
+            && self.settings.is_empty()
     }
 
     /// Returns true if all codes are ignored: then the words belong to them.
     pub(super) fn is_ignored(&self) -> bool {
-        !self.ignored.is_empty() && self.g.is_empty() && self.m.is_empty()
+        self.is_ignored_line && self.g.is_empty() && self.m.is_empty()
     }
 
     /// Rejects words that no code has used.
     pub(super) fn require_used(&self) -> Outcome<()> {
-        if self.unused == 0 || !self.ignored.is_empty() {
+        if self.unused == 0 || self.is_ignored_line {
             return Ok(());
         }
         let letter = char::from(b'A' + self.unused.trailing_zeros() as u8);

@@ -1,43 +1,64 @@
 //! Interpreter of part programs: RS-274/NGC text to motions of the axes.
 //!
-//! Syntax and meaning of the words are those of LinuxCNC, with tool center point control (G43.4) and subprograms by
-//! number (M98, M99) as on other controls; docs/reference/part-programs.md has the list. A program is read line by
-//! line, loops and subprograms by jumps in the source: memory does not depend on the length of the program. Depth of
-//! calls and expressions, length of lines and number of repeated lines are bounded.
+//! Syntax and meaning of the words are those of the dialect, by default LinuxCNC; docs/reference/part-programs.md has the
+//! list. A program is read line by line, loops and subprograms by jumps in the source: memory does not depend on the length
+//! of the program. Depth of calls and expressions, length of lines and number of repeated lines are bounded.
 
 mod arcs;
+mod calls;
 mod codes;
+mod contour;
+mod contour_steps;
+mod control_variables;
 mod cycles;
+mod dialect;
 mod error;
 mod execute;
 mod expression;
+mod files;
 mod flow;
+mod frame;
+mod frames;
+mod ignored;
 mod limits;
 mod line_words;
+mod macro_b;
 mod moves;
 mod o_words;
 mod offsets;
 mod options;
 mod parameters;
+mod pocket;
+mod report;
+mod sinumerik;
 mod source;
 mod spline;
 mod state;
 mod text;
+mod tools;
+mod work_offset;
 
-use std::collections::BTreeMap;
 use std::io::{BufRead, Seek};
 
+use virtual_axes_core::text::escaped;
+
+pub use dialect::{DetectedDialect, Dialect, is_g_code};
 pub use error::ProgramError;
-pub use options::{InterpreterOptions, TipTransform, WORK_OFFSET_COUNT};
+pub use ignored::{CodePattern, IgnoredCodes};
+pub use offsets::system_name;
+pub use options::{ADDITIONAL_OFFSET_COUNT, InterpreterOptions, TipTransform, WORK_OFFSET_COUNT};
+pub use report::{InterpretationReport, OccurrenceTable, Occurrences};
+pub use tools::{Tool, ToolTable};
+pub use work_offset::WorkOffset;
 
 use self::error::Outcome;
-use self::flow::Flow;
 use self::line_words::LineWords;
-use self::o_words::is_o_word;
+use self::o_words::{Flow, is_o_word};
+use self::sinumerik::Sinumerik;
 use self::source::LineSource;
 use self::state::State;
 use self::text::LineText;
-use crate::motion::ProgramStep;
+use crate::motion::{Coordinates, ProgramStep};
 
 /// Interpreter of one program: an iterator over its steps, in memory independent of the program's length.
 ///
@@ -50,29 +71,30 @@ pub struct Interpreter<R> {
     block: LineWords,
     state: State,
     flow: Flow,
-    ignored: BTreeMap<u32, IgnoredCode>,
-}
-
-/// Occurrences of an ignored M code in the lines executed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct IgnoredCode {
-    /// Number of executed lines with the code.
-    pub count: u64,
-    /// First source line with the code, from 1.
-    pub first_line: usize,
+    dialect: DetectedDialect,
+    /// Front end of native Sinumerik programs.
+    sinumerik: Sinumerik,
 }
 
 impl<R: BufRead + Seek> Interpreter<R> {
     /// Creates the interpreter of the program in `source`, from its start; `name` is the file in messages.
-    pub fn new(source: R, name: &str, options: InterpreterOptions) -> Self {
+    pub fn new(mut source: R, name: &str, mut options: InterpreterOptions) -> Self {
+        let dialect = match options.dialect {
+            Some(dialect) => DetectedDialect { dialect, evidence: None },
+            None => DetectedDialect::of(&mut source),
+        };
+        let has_given_dialect = options.dialect.replace(dialect.dialect).is_some();
+        let mut state = State::new(options);
+        state.has_given_dialect = has_given_dialect;
         Self {
+            dialect,
+            sinumerik: Sinumerik::default(),
             name: name.to_owned(),
-            source: LineSource::new(source, options.repeated_lines),
+            source: LineSource::new(source, state.options.repeated_lines),
             line: LineText::default(),
             block: LineWords::default(),
-            state: State::new(options),
+            state,
             flow: Flow::default(),
-            ignored: BTreeMap::new(),
         }
     }
 
@@ -81,9 +103,25 @@ impl<R: BufRead + Seek> Interpreter<R> {
         self.source.line()
     }
 
-    /// Returns the ignored M codes of the lines executed so far.
-    pub fn ignored_codes(&self) -> &BTreeMap<u32, IgnoredCode> {
-        &self.ignored
+    /// Returns the dialect of the program, and what it was detected from.
+    pub fn dialect(&self) -> &DetectedDialect {
+        &self.dialect
+    }
+
+    /// Returns words without effect, assumptions and errors of the lines executed so far.
+    pub fn report(&self) -> &InterpretationReport {
+        &self.state.report
+    }
+
+    /// Returns true if the motions of the last line are in machine coordinates: G28, G30, G53.
+    pub fn moves_in_machine_coordinates(&self) -> bool {
+        self.state.moves_in_machine_coordinates
+    }
+
+    /// Returns the index of the active work coordinate system and its axis positions at coordinate 0, m and rad.
+    pub fn work_offset(&self) -> (usize, Coordinates) {
+        let active = self.state.offsets.active;
+        (active, self.state.options.work_offsets[active])
     }
 
     /// Returns true for an optional line that the options skip.
@@ -93,28 +131,45 @@ impl<R: BufRead + Seek> Interpreter<R> {
 
     /// Executes the next line.
     fn execute_line(&mut self) -> Outcome<()> {
+        if self.state.dialect == Dialect::Sinumerik {
+            return self.sinumerik.execute_line(&mut self.source, &mut self.state);
+        }
         let place = self.source.place();
         let is_line = self.source.read(&mut self.line.raw);
         self.state.line = self.source.line();
         if !is_line? {
+            self.state.has_ended = true;
             self.require_closed()?;
-            self.state.end();
-            return Ok(());
+            return self.state.end();
         }
-        self.line.compact()?;
+        self.line.compact(self.state.dialect)?;
         if self.is_skipped(&self.line) {
             return Ok(());
         }
         if let Some(message) = self.line.message.take() {
             self.state.push_event(crate::motion::ProgramEvent::Message(message));
         }
-        if is_o_word(&self.line.text) {
+        if self.state.dialect.has_macro_b() {
+            if self.execute_statement(place)? {
+                return Ok(());
+            }
+        } else if self.line.text.first() == Some(&b'$') && self.state.dialect == Dialect::Grbl {
+            let command = String::from_utf8_lossy(&self.line.text).to_uppercase();
+            self.state.note_without_effect(command);
+            return Ok(());
+        }
+        if is_o_word(&self.line.text) && !self.state.dialect.has_macro_b() {
             return self.execute_o_word(place);
         }
-        self.block.read(&self.line.text, &self.state, &self.state.options.ignored_m_codes)?;
-        for &code in &self.block.ignored {
-            let first = IgnoredCode { count: 0, first_line: self.state.line };
-            self.ignored.entry(code).or_insert(first).count += 1;
+        self.execute_words(0)
+    }
+
+    /// Executes the words of the present line from a byte on.
+    fn execute_words(&mut self, from: usize) -> Outcome<()> {
+        self.block.read(self.line.text.get(from..).unwrap_or_default(), &self.state)?;
+        for code in self.block.ignored.drain(..) {
+            self.state.note_without_effect(code);
+            self.block.is_ignored_line = true;
         }
         self.state.execute(&mut self.block)?;
         self.execute_jump()
@@ -133,7 +188,17 @@ impl<R: BufRead + Seek> Iterator for Interpreter<R> {
             if self.state.has_ended {
                 return None;
             }
-            if let Err(reason) = self.execute_line() {
+            let line = self.execute_line();
+            let at_file = |reason: String| match self.source.line_of_file() {
+                Some(line) => escaped(&format!("line {line} of the file of a subprogram: {reason}")),
+                None => escaped(&reason),
+            };
+            if let Err(reason) = line.map_err(at_file) {
+                if self.state.options.reports_all_errors && !self.source.has_failed() {
+                    // An interpreter that continues returns no error of a line.
+                    let _ = self.state.reject(reason);
+                    continue;
+                }
                 self.state.steps.clear();
                 self.state.has_ended = true;
                 return Some(Err(ProgramError { name: self.name.clone(), line: self.state.line, reason }));

@@ -2,31 +2,42 @@
 
 use std::f64::consts::TAU;
 
-use virtual_axes_core::units::{MINUTE, RPM};
+use nalgebra::Vector3;
+use virtual_axes_core::units::{DEGREE, MINUTE, RPM};
 
+use super::codes::{FeedMode, Motion};
+use super::dialect::Dialect;
 use super::error::Outcome;
 use super::limits::{MAX_ANGLE, MAX_LENGTH};
 use super::line_words::LineWords;
-use super::state::{FeedMode, State, is_rotary};
-use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates, Feed, MotionKind, ProgramMotion, ProgramStep};
+use super::state::{State, is_rotary};
+use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates, Feed, MotionKind, PlanarArc, ProgramMotion};
 
 /// Distance of each axis below which a straight motion is the rounding of no motion, m and rad.
 const STILL: f64 = 1e-12;
+/// Distance of the chords of an arc from it, where it is no circle in a plane of axes, m.
+const CHORD_ERROR: f64 = 0.2e-6;
+/// Largest number of chords of an arc.
+const MAX_CHORDS: f64 = 1e5;
 
 impl State {
     /// Executes the motion of a line: that of its code `motion`, or the modal one if the line has its words.
     pub(super) fn move_by(
         &mut self,
         block: &mut LineWords,
-        motion: Option<u16>,
+        motion: Option<Motion>,
         is_machine: bool,
     ) -> Outcome<()> {
-        let is_arc = matches!(self.modal.motion, Some(20 | 30));
-        let has_words = block.has_axis() || (is_arc && block.has_any(&['I', 'J', 'K', 'R']));
+        let is_arc = matches!(self.modal.motion, Some(Motion::ClockwiseArc | Motion::CounterclockwiseArc));
+        let has_words = block.has_axis()
+            || (is_arc && block.has_any(&['I', 'J', 'K', 'R']))
+            || (self.modal.has_tool_vectors && block.has_any(&['I', 'J', 'K']));
         if motion.is_none() && !has_words && !is_machine {
             return Ok(());
         }
-        let Some(code) = self.modal.motion else {
+        let is_linuxcnc = self.dialect == Dialect::LinuxCnc;
+        let default = (is_machine && !is_linuxcnc).then_some(Motion::Rapid);
+        let Some(code) = self.modal.motion.or(default) else {
             return match has_words {
                 true => Err(format!("{}: axis word without G0, G1, G2 or G3", axis_words(block))),
                 false if is_machine => Err("G53 requires G0 or G1".to_owned()),
@@ -34,35 +45,185 @@ impl State {
             };
         };
         if is_machine {
-            self.require_axis_positions()?;
-            if self.modal.is_incremental || !matches!(code, 0 | 10) {
+            let is_straight = matches!(code, Motion::Rapid | Motion::Line);
+            if is_linuxcnc && (self.modal.is_incremental || !is_straight) {
                 return Err("G53 requires G90 with G0 or G1".to_owned());
             }
+            return self.move_in_machine_coordinates(block, code);
+        }
+        if !has_words && code != Motion::Nurbs {
+            return Ok(());
         }
         match code {
-            0 | 10 if has_words => {
-                let end = self.targets(block, is_machine)?;
-                if code == 0 { self.push_rapid(end) } else { self.push_feed(MotionKind::Line, end) }
+            Motion::Rapid => {
+                let end = self.targets(block)?;
+                self.rapid_to(&end)
             }
-            20 | 30 if has_words => self.arc(block, code == 20),
-            730..=890 if has_words => self.cycle(block, code),
-            50..=52 if has_words || code == 52 => self.start_spline(block, code),
-            _ => Ok(()),
+            Motion::Line => {
+                let end = self.targets(block)?;
+                self.line_to(&end)
+            }
+            Motion::Synchronous | Motion::SynchronousTapping => self.synchronous(block, code),
+            Motion::ClockwiseArc => self.arc(block, true),
+            Motion::CounterclockwiseArc => self.arc(block, false),
+            Motion::CubicSpline | Motion::QuadraticSpline | Motion::Nurbs => self.start_spline(block, code),
+            Motion::Cancel | Motion::NurbsEnd => Ok(()),
+            _ => self.cycle(block, code),
         }
     }
 
-    /// Returns the end of a motion by the axis words, which then count as used; `is_machine` for axis positions (G53).
-    pub(super) fn targets(&self, block: &mut LineWords, is_machine: bool) -> Outcome<Coordinates> {
-        let mut end = self.position;
-        for (axis, value) in self.take_axes(block)?.into_iter().enumerate() {
+    /// Returns the programmed coordinates of the end of a motion by the axis words, which then count as used, m and rad.
+    pub(super) fn targets(&mut self, block: &mut LineWords) -> Outcome<Coordinates> {
+        let mut end = self.programmed();
+        let increments = self.take_increments(block);
+        let [first, second, _] = self.modal.plane.axes();
+        let in_plane = [first, second].map(|axis| block.get(AXIS_LETTERS[axis]));
+        let words = self.take_axes(block)?;
+        for (end, value) in end.iter_mut().zip(words) {
             let Some(value) = value else { continue };
-            end[axis] = match (is_machine, self.modal.is_incremental) {
-                (true, _) => value,
-                (false, true) => self.position[axis] + value,
-                (false, false) => value + self.origin(axis),
+            *end = if self.modal.is_incremental { *end + value } else { value };
+        }
+        if block.polar != [None; 2] {
+            let [radius, angle] = std::mem::take(&mut block.polar);
+            let before = [end[first].hypot(end[second]), end[second].atan2(end[first])];
+            let is_incremental = self.modal.is_incremental;
+            let coordinate = |word: Option<f64>, unit: f64, before: f64| match word {
+                Some(word) if is_incremental => before + word * unit,
+                Some(word) => word * unit,
+                None => before,
             };
+            let radius = coordinate(radius, self.modal.length, before[0]);
+            let (sin, cos) = coordinate(angle, DEGREE, before[1]).sin_cos();
+            (end[first], end[second]) = (radius * cos, radius * sin);
+        }
+        if self.modal.polar.is_some() {
+            let raw = [words[first].unwrap_or(0.0), in_plane[1].unwrap_or(0.0)];
+            self.replace_polar(&in_plane.map(|word| word.is_some()), [first, second], &mut end, raw);
+        }
+        for (end, increment) in end.iter_mut().zip(increments) {
+            *end += increment.unwrap_or(0.0);
+        }
+        if self.modal.has_tool_vectors {
+            self.orient(block, &mut end)?;
         }
         Ok(end)
+    }
+
+    /// Replaces A, B and C by those of the tool direction I J K (G43.5), which then count as used.
+    fn orient(&mut self, block: &mut LineWords, end: &mut Coordinates) -> Outcome<()> {
+        if !matches!(self.modal.motion, Some(Motion::Rapid | Motion::Line))
+            || !block.has_any(&['I', 'J', 'K'])
+        {
+            return Ok(());
+        }
+        let direction = ['I', 'J', 'K'].map(|letter| block.take(letter).unwrap_or(0.0));
+        let transform = self.options.kinematics.as_ref();
+        let transform = transform.ok_or("G43.5 requires a machine with kinematics")?;
+        let near = self.position_at(end);
+        let oriented = transform
+            .oriented(direction, &near)
+            .map_err(|reason| format!("tool direction I J K: {reason}"))?;
+        for axis in 3..6 {
+            end[axis] = oriented[axis] - self.origin(axis);
+        }
+        Ok(())
+    }
+
+    /// Executes a motion in machine coordinates (G53): without offsets and tool center point control.
+    fn move_in_machine_coordinates(&mut self, block: &mut LineWords, code: Motion) -> Outcome<()> {
+        if !block.has_axis() {
+            return Ok(());
+        }
+        self.finish_contour()?;
+        self.moves_in_machine_coordinates = true;
+        let tcp_length = self.modal.tcp_length;
+        self.leave_tcp();
+        let mut end = self.position;
+        for (end, value) in end.iter_mut().zip(self.take_axes(block)?) {
+            *end = value.unwrap_or(*end);
+        }
+        match code {
+            Motion::Line => self.push_feed(MotionKind::Line, end)?,
+            _ => self.push_rapid(end)?,
+        }
+        tcp_length.map_or(Ok(()), |length| self.enter_tcp(length))
+    }
+
+    /// Executes a straight line with a pitch per revolution: G33 K, or G33.1 K to a point and back.
+    fn synchronous(&mut self, block: &mut LineWords, code: Motion) -> Outcome<()> {
+        let pitch = block.take('K').filter(|pitch| *pitch > 0.0);
+        let pitch = pitch.ok_or("G33 and G33.1 require K above 0, the pitch per revolution")?;
+        if self.modal.spindle_speed == 0.0 || self.modal.spindle_direction == 0.0 {
+            return Err("G33 and G33.1 require a turning spindle: program S with M3 or M4".to_owned());
+        }
+        let start = self.programmed();
+        let end = self.targets(block)?;
+        let feed = [pitch * self.modal.length, pitch * DEGREE];
+        let (mode, before) = (self.modal.feed_mode, self.modal.feed.replace(feed));
+        self.modal.feed_mode = FeedMode::PerRevolution;
+        self.line_to(&end)?;
+        if code == Motion::SynchronousTapping {
+            self.push_spindle(-1.0);
+            self.line_to(&start)?;
+            self.push_spindle(1.0);
+        }
+        (self.modal.feed_mode, self.modal.feed) = (mode, before);
+        Ok(())
+    }
+
+    /// Appends a rapid traverse to programmed coordinates, m and rad.
+    pub(super) fn rapid_to(&mut self, programmed: &Coordinates) -> Outcome<()> {
+        self.push_rapid(self.position_at(programmed))
+    }
+
+    /// Appends a straight line at feed to programmed coordinates, m and rad.
+    pub(super) fn line_to(&mut self, programmed: &Coordinates) -> Outcome<()> {
+        self.push_feed(MotionKind::Line, self.position_at(programmed))
+    }
+
+    /// Appends an arc at feed to programmed coordinates, m and rad; plane, center and sweep of `arc` are programmed ones
+    /// too.
+    pub(super) fn arc_to(&mut self, arc: &PlanarArc, programmed: &Coordinates) -> Outcome<()> {
+        let map = self.map();
+        let start = self.programmed();
+        let [first, second, _] = arc.plane.axes();
+        let Some((plane, sign)) = map.image_of(arc.plane) else {
+            return self.chords_to(arc, &start, programmed);
+        };
+        let mut center = Vector3::from_column_slice(&start[..3]);
+        [center[first], center[second]] = arc.center;
+        let center = map.apply(&center);
+        let [first, second, _] = plane.axes();
+        let arc = PlanarArc { plane, center: [center[first], center[second]], sweep: sign * arc.sweep };
+        self.push_feed(MotionKind::Arc(arc), self.position_at(programmed))
+    }
+
+    /// Appends an arc that is no circle in a plane of axes as straight lines.
+    fn chords_to(&mut self, arc: &PlanarArc, start: &Coordinates, end: &Coordinates) -> Outcome<()> {
+        let [first, second, _] = arc.plane.axes();
+        let from = [start[first] - arc.center[0], start[second] - arc.center[1]];
+        let radii = [from, [end[first] - arc.center[0], end[second] - arc.center[1]]]
+            .map(|[x, y]: [f64; 2]| x.hypot(y));
+        let step = (8.0 * CHORD_ERROR / (radii[0].max(radii[1]) * self.map().linear.norm())).sqrt();
+        let count = (arc.sweep.abs() / step).ceil().clamp(1.0, MAX_CHORDS);
+        let feed_word = self.modal.feed;
+        if let (FeedMode::InverseTime, Some(feed)) = (self.modal.feed_mode, &mut self.modal.feed) {
+            feed[0] *= count;
+        }
+        for index in 1..=count as usize {
+            let share = index as f64 / count;
+            let mut point: Coordinates =
+                std::array::from_fn(|axis| start[axis] + share * (end[axis] - start[axis]));
+            if (index as f64) < count {
+                let (sin, cos) = (arc.sweep * share).sin_cos();
+                let size = 1.0 + share * (radii[1] / radii[0] - 1.0);
+                point[first] = arc.center[0] + size * (from[0] * cos - from[1] * sin);
+                point[second] = arc.center[1] + size * (from[0] * sin + from[1] * cos);
+            }
+            self.line_to(&point)?;
+        }
+        self.modal.feed = feed_word;
+        Ok(())
     }
 
     /// Appends a rapid traverse to the steps.
@@ -95,8 +256,7 @@ impl State {
         let Self { line, modal, .. } = self;
         let (line, path_control, tcp_length) = (*line, modal.path_control, modal.tcp_length);
         let motion = ProgramMotion { line, kind, start, end, feed, path_control, tcp_length };
-        self.steps.push_back(ProgramStep::Motion(motion));
-        Ok(())
+        self.push_contour(motion)
     }
 
     /// Returns the feed of a motion to `end`; `is_line` if the end alone determines the moving axes.

@@ -1,49 +1,44 @@
-//! Statements of O-words: label, keyword and expressions.
+//! O-words: their statements, and the calls, loops and conditions that they open.
+
+use std::collections::HashMap;
 
 use super::error::Outcome;
 use super::expression::Scanner;
-use super::parameters::{LOCALS, Variables, integer};
+use super::parameters::{CallerScope, LOCALS, integer};
+use super::source::Place;
 
-/// Keyword of an O-word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Keyword {
-    /// Number of a program or subprogram: the label alone.
-    Program,
-    Sub,
-    EndSub,
-    Return,
-    Call,
-    Do,
-    While,
-    EndWhile,
-    If,
-    ElseIf,
-    Else,
-    EndIf,
-    Break,
-    Continue,
-    Repeat,
-    EndRepeat,
+/// Declares the keywords; no keyword begins a later one.
+macro_rules! keywords {
+    ($($keyword:ident = $name:literal),+) => {
+        /// Keyword of an O-word.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub(super) enum Keyword {
+            /// Number of a program or subprogram: the label alone.
+            Program,
+            $(#[doc = concat!("`", $name, "`.")] $keyword,)+
+        }
+
+        const KEYWORDS: &[(&str, Keyword)] = &[$(($name, Keyword::$keyword)),+];
+    };
 }
 
-/// Keywords in lower case; no keyword begins a later one.
-const KEYWORDS: [(&str, Keyword); 15] = [
-    ("endsub", Keyword::EndSub),
-    ("sub", Keyword::Sub),
-    ("return", Keyword::Return),
-    ("call", Keyword::Call),
-    ("do", Keyword::Do),
-    ("while", Keyword::While),
-    ("endwhile", Keyword::EndWhile),
-    ("if", Keyword::If),
-    ("elseif", Keyword::ElseIf),
-    ("else", Keyword::Else),
-    ("endif", Keyword::EndIf),
-    ("break", Keyword::Break),
-    ("continue", Keyword::Continue),
-    ("repeat", Keyword::Repeat),
-    ("endrepeat", Keyword::EndRepeat),
-];
+keywords!(
+    EndSub = "endsub",
+    Sub = "sub",
+    Return = "return",
+    Call = "call",
+    Do = "do",
+    While = "while",
+    EndWhile = "endwhile",
+    If = "if",
+    ElseIf = "elseif",
+    Else = "else",
+    EndIf = "endif",
+    Break = "break",
+    Continue = "continue",
+    Repeat = "repeat",
+    EndRepeat = "endrepeat"
+);
 
 impl Keyword {
     /// Returns the keyword as in a program.
@@ -60,12 +55,62 @@ pub(super) struct Statement {
     pub keyword: Keyword,
 }
 
+/// Calls, loops and conditions that are open.
+#[derive(Debug, Default)]
+pub(super) struct Flow {
+    pub calls: Vec<Call>,
+    /// Loops and conditions of the main program.
+    pub blocks: Vec<OpenBlock>,
+    /// Lines by their numbers N that a jump has required, with the first line of their program.
+    pub numbered: HashMap<(Place, u32), Place>,
+    /// Loops of macro B by their numbers: the line of their beginning, with the depth of calls.
+    pub loops: HashMap<(usize, u32), Place>,
+    /// First line of each subprogram, once a call has required them.
+    pub subprograms: Option<HashMap<String, Place>>,
+}
+
+/// Subprogram that runs.
+#[derive(Debug)]
+pub(super) struct Call {
+    pub label: String,
+    pub entry: Place,
+    /// First line of the program or subprogram with the numbers of its lines.
+    pub section: Place,
+    pub return_to: Place,
+    /// Parameters of the caller; `None` after M98, which shares them.
+    pub scope: Option<CallerScope>,
+    /// True if M99 returns.
+    pub is_by_number: bool,
+    /// Number of further runs (M98 L).
+    pub runs_left: u32,
+    pub blocks: Vec<OpenBlock>,
+}
+
+/// Loop or condition that is open.
+#[derive(Debug)]
+pub(super) struct OpenBlock {
+    pub label: String,
+    pub kind: BlockKind,
+}
+
+/// Kind of an open block.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum BlockKind {
+    If,
+    /// Loop from its `while`.
+    While(Place),
+    /// Loop from the line after its `do`.
+    Do(Place),
+    /// Loop from the line after its `repeat`, with the number of further runs.
+    Repeat(Place, u32),
+}
+
 /// Returns true if a compact line has an O-word.
 pub(super) fn is_o_word(text: &[u8]) -> bool {
     text.first() == Some(&b'o')
 }
 
-impl<V: Variables> Scanner<'_, V> {
+impl Scanner<'_> {
     /// Reads label and keyword of an O-word.
     pub(super) fn statement(&mut self) -> Outcome<Statement> {
         let text = self.rest();
@@ -80,12 +125,12 @@ impl<V: Variables> Scanner<'_, V> {
                     .to_string()
             }
         };
-        let keyword = KEYWORDS.into_iter().find(|(name, _)| self.skip(name)).map(|(_, keyword)| keyword);
+        let keyword = KEYWORDS.iter().find(|(name, _)| self.skip(name)).map(|(_, keyword)| *keyword);
         match keyword {
             Some(keyword) => Ok(Statement { label, keyword }),
             None if self.peek().is_none() => Ok(Statement { label, keyword: Keyword::Program }),
             None => {
-                let known = KEYWORDS.map(|(name, _)| name).join(" ");
+                let known = KEYWORDS.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(" ");
                 Err(format!("O{label} {}: not a keyword; supported: {known}", self.rest()))
             }
         }

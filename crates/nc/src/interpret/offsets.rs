@@ -1,28 +1,54 @@
-//! Offsets and references: G10, G28, G30, G43, G49, G52 to G59.3, G92.
+//! Offsets and references: G10, G28, G30, G40 to G44, G49, G52 to G59.3, G92.
 
-use super::codes::{Codes, Group};
+use super::codes::{
+    Action, Codes, CoordinateSystem, CutterCompensation, KinematicsSwitch, ToolLength, g_name,
+};
+use super::contour::Compensation;
+use super::dialect::Dialect;
 use super::error::Outcome;
 use super::line_words::LineWords;
-use super::options::WORK_OFFSET_COUNT;
+use super::options::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
 use super::state::State;
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS};
-
-/// Work coordinate systems, in tenths of their G codes.
-const SYSTEMS: [u16; WORK_OFFSET_COUNT] = [540, 550, 560, 570, 580, 590, 591, 592, 593];
 
 impl State {
     /// Returns true if a named parameter belongs to the control.
     pub(super) fn is_of_control(&self, name: &str) -> bool {
-        use super::parameters::Variables;
-
         self.is_defined(name) && self.parameters.named(name).is_none()
     }
 
-    pub(super) fn set_coordinate_system(&mut self, codes: &Codes) {
-        let code = codes.g(Group::Coordinates);
-        if let Some(system) = SYSTEMS.iter().position(|system| Some(*system) == code) {
-            self.offsets.active = system;
+    /// Selects the work coordinate system: G54 to G59.3, G54.1 P, G154 P, G110 to G129, and G59 P of Mach3.
+    pub(super) fn set_coordinate_system(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
+        let Some(code) = codes.g.coordinates else { return Ok(()) };
+        let of_code = block.g.iter().find(|code| (1100..=1290).contains(*code)).map(|code| code / 10 - 109);
+        let is_additional = code.index().is_none();
+        let takes_p = is_additional || (code == CoordinateSystem::First && self.dialect == Dialect::Fanuc);
+        let number = match of_code {
+            Some(number) => Some(u32::from(number)),
+            None if takes_p && codes.g.action.is_none() => block.take_integer('P')?,
+            None => None,
+        };
+        self.offsets.active = match (code.index(), number) {
+            (Some(index), None) => index,
+            (_, Some(number)) if (1..=ADDITIONAL_OFFSET_COUNT as u32).contains(&number) => {
+                WORK_OFFSET_COUNT - 1 + number as usize
+            }
+            _ => {
+                let name = g_name(code.number());
+                return Err(format!(
+                    "{name} requires P, the work coordinate system 1 to {ADDITIONAL_OFFSET_COUNT}"
+                ));
+            }
+        };
+        if let Some(given) = &self.options.given_work_offsets
+            && !given.contains(&self.offsets.active)
+        {
+            self.assume(format!(
+                "work offset {} is not given: the workpiece frame of the machine",
+                system_name(self.offsets.active)
+            ));
         }
+        Ok(())
     }
 
     /// Returns the axis words in m and rad, which then count as used.
@@ -34,6 +60,10 @@ impl State {
         let mut values = [None; AXIS_COUNT];
         for (axis, letter) in AXIS_LETTERS.into_iter().enumerate() {
             let Some(value) = block.take(letter) else { continue };
+            if !self.options.axes[axis] && self.dialect != Dialect::LinuxCnc && value == 0.0 && axis >= 3 {
+                // An axis that the machine lacks may stay at 0.
+                continue;
+            }
             if !self.options.axes[axis] {
                 let known = AXIS_LETTERS.into_iter().zip(self.options.axes).filter(|(_, has)| *has);
                 let known = known.map(|(letter, _)| letter.to_string()).collect::<Vec<_>>().join(" ");
@@ -44,59 +74,165 @@ impl State {
         Ok(values)
     }
 
-    /// Sets a work offset: G10 L2 (offset) or G10 L20 (coordinates of the position).
-    pub(super) fn set_offset_data(&mut self, block: &mut LineWords) -> Outcome<()> {
-        let system = block.take_integer('P')?.map(|number| number as usize);
-        let system = system.filter(|number| *number <= WORK_OFFSET_COUNT);
-        let system = system.ok_or("G10 requires P, the coordinate system 1 to 9, or 0 for the active one")?;
-        let system = system.checked_sub(1).unwrap_or(self.offsets.active);
-        let level = block.take_integer('L')?;
-        let level = level.filter(|level| [2, 20].contains(level)).ok_or("G10 requires L2 or L20")?;
-        let words = self.take_axes(block)?;
-        if words.iter().all(Option::is_none) {
-            return Err(format!("G10 L{level} requires at least one axis word"));
+    /// Sets offsets and tools: G10 L1, L10 to L13 (tools), L2 (work offset), L20 (coordinates of the position, or
+    /// additional work offset).
+    pub(super) fn set_data(&mut self, block: &mut LineWords) -> Outcome<()> {
+        let is_macro_b = self.dialect.has_macro_b();
+        let level = block.take_integer('L')?.or(is_macro_b.then_some(2));
+        match level {
+            // Loads the tool table again.
+            Some(0) => return Ok(()),
+            Some(1 | 10 | 11 | 12 | 13) => return self.set_tool_data(block, level.unwrap_or_default()),
+            Some(2 | 20) => {}
+            Some(level) if is_macro_b && (50..=52).contains(&level) => {
+                self.note_without_effect(format!("G10 L{level}"));
+                block.skip("ABCDEHIJKPQRUVWXYZ");
+                return Ok(());
+            }
+            _ => return Err("G10 requires L2 or L20, or L1 or L10 to L13 for tools".to_owned()),
         }
-        for (axis, value) in words.into_iter().enumerate() {
-            let Some(value) = value else { continue };
-            let rest = self.origin(axis) - self.options.work_offsets[self.offsets.active][axis];
-            self.options.work_offsets[system][axis] =
-                if level == 2 { value } else { self.position[axis] - rest - value };
+        let level = level.unwrap_or_default();
+        let number = block.take_integer('P')?.map(|number| number as usize);
+        if level == 20 && is_macro_b {
+            let number = number.filter(|number| (1..=ADDITIONAL_OFFSET_COUNT).contains(number));
+            let number =
+                number.ok_or("G10 L20 requires P, the additional work coordinate system 1 to 300")?;
+            return self.set_offset(block, WORK_OFFSET_COUNT - 1 + number, 2);
+        }
+        let system = number.filter(|number| *number <= WORK_OFFSET_COUNT);
+        let system = system.ok_or("G10 requires P, the coordinate system 1 to 9, or 0 for the active one")?;
+        if system == 0 && is_macro_b {
+            return Err("G10 L2 P0, the external work offset, is not supported: add it to the work offsets"
+                .to_owned());
+        }
+        let system = system.checked_sub(1).unwrap_or(self.offsets.active);
+        self.set_offset(block, system, level)
+    }
+
+    /// Sets length or radius of a tool: G10 L1, L10, L11 (length), L12, L13 (radius).
+    fn set_tool_data(&mut self, block: &mut LineWords, level: u32) -> Outcome<()> {
+        let number = block.take_integer('P')?.ok_or("G10 of a tool requires P, its number")?;
+        let is_macro_b = self.dialect.has_macro_b();
+        let unit = self.modal.length;
+        let radius = block.take('R').map(|value| value * unit);
+        let is_incremental = self.modal.is_incremental && is_macro_b;
+        if is_macro_b {
+            let value = radius.ok_or("G10 of a tool requires R, its length or radius")?;
+            let tool = self.options.tools.entry(number);
+            let part = match level {
+                12 | 13 => &mut tool.radius,
+                _ => &mut tool.length,
+            };
+            // L11 and L13 are wear, in addition to the geometry.
+            *part = if is_incremental || level == 11 || level == 13 { *part + value } else { value };
+            return Ok(());
+        }
+        let words = self.take_axes(block)?;
+        block.skip("IJQ");
+        let origin = self.origin(2) - self.offsets.tool_length;
+        let position = self.position[2];
+        let tool = self.options.tools.entry(number);
+        tool.radius = radius.unwrap_or(tool.radius);
+        if let Some(z) = words[2] {
+            tool.length = match level {
+                1 => z,
+                10 => position - origin - z,
+                _ => position - z,
+            };
         }
         Ok(())
     }
 
+    fn set_offset(&mut self, block: &mut LineWords, system: usize, level: u32) -> Outcome<()> {
+        if let Some(given) = &mut self.options.given_work_offsets {
+            given.insert(system);
+        }
+        let is_incremental = self.modal.is_incremental && self.dialect.has_macro_b();
+        let rotation = block.take('R').filter(|_| level == 2);
+        let words = self.take_axes(block)?;
+        if words.iter().all(Option::is_none) && rotation.is_none() {
+            return Err(format!("G10 L{level} requires at least one axis word"));
+        }
+        if level == 20 {
+            return self.set_coordinates(&words, system, |state, axis, value| {
+                state.options.work_offsets[system][axis] += value;
+            });
+        }
+        for (offset, value) in self.options.work_offsets[system].iter_mut().zip(words) {
+            let Some(value) = value else { continue };
+            *offset = if is_incremental { *offset + value } else { value };
+        }
+        if let Some(rotation) = rotation {
+            self.offsets.rotations.insert(system, rotation.to_radians());
+        }
+        Ok(())
+    }
+
+    /// Changes an offset of a coordinate system by `add`, so that the position gets the coordinates of the words.
+    fn set_coordinates(
+        &mut self,
+        words: &[Option<f64>; AXIS_COUNT],
+        system: usize,
+        add: impl Fn(&mut Self, usize, f64),
+    ) -> Outcome<()> {
+        let active = std::mem::replace(&mut self.offsets.active, system);
+        let mut wanted = self.programmed();
+        for (wanted, word) in wanted.iter_mut().zip(words) {
+            *wanted = word.unwrap_or(*wanted);
+        }
+        let position = self.position_at(&wanted);
+        let present = self.position;
+        for (axis, (present, wanted)) in present.into_iter().zip(position).enumerate() {
+            add(self, axis, present - wanted);
+        }
+        self.offsets.active = active;
+        Ok(())
+    }
+
     /// Sets the shift of all coordinate systems: G52 (shift) or G92 (coordinates of the position).
-    pub(super) fn shift(&mut self, block: &mut LineWords, code: u16) -> Outcome<()> {
+    pub(super) fn shift(&mut self, block: &mut LineWords, code: Action) -> Outcome<()> {
         let words = self.take_axes(block)?;
         if words.iter().all(Option::is_none) {
-            return Err(format!("G{} requires at least one axis word", code / 10));
+            // G92 S limits the speed of the spindle.
+            if self.dialect.has_macro_b() && code == Action::ShiftToPosition {
+                return Ok(());
+            }
+            return Err(format!("{} requires at least one axis word", g_name(code.number())));
         }
-        for (axis, value) in words.into_iter().enumerate() {
-            let Some(value) = value else { continue };
-            let rest = self.origin(axis) - self.offsets.shift[axis];
-            self.offsets.shift[axis] = if code == 520 { value } else { self.position[axis] - rest - value };
+        self.finish_contour()?;
+        if code == Action::Shift {
+            for (shift, value) in self.offsets.shift.iter_mut().zip(words) {
+                *shift = value.unwrap_or(*shift);
+            }
+        } else {
+            let rotation = self.offsets.rotations.get(&self.offsets.active).copied().unwrap_or(0.0);
+            let (sin, cos) = rotation.sin_cos();
+            self.set_coordinates(&words, self.offsets.active, |state, axis, value| match axis {
+                0 => {
+                    state.offsets.shift[0] += cos * value;
+                    state.offsets.shift[1] -= sin * value;
+                }
+                1 => {
+                    state.offsets.shift[0] += sin * value;
+                    state.offsets.shift[1] += cos * value;
+                }
+                _ => state.offsets.shift[axis] += value,
+            })?;
         }
         self.offsets.saved_shift = self.offsets.shift;
         Ok(())
     }
 
-    /// Clears (G92.1), suspends (G92.2) or restores (G92.3) the shift.
-    pub(super) fn change_shift(&mut self, code: u16) {
-        self.offsets.shift = if code == 923 { self.offsets.saved_shift } else { [0.0; AXIS_COUNT] };
-        if code == 921 {
-            self.offsets.saved_shift = self.offsets.shift;
-        }
-    }
-
-    /// Sets the tool length: G43, G43.1, G43.4, G49.
+    /// Sets the tool length: G43, G43.1, G43.2, G43.4, G43.5, G44, G234, G49.
     pub(super) fn set_tool_length(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
-        match codes.g(Group::ToolLength) {
-            None => {}
-            Some(490) => {
+        let Some(code) = codes.g.tool_length else { return Ok(()) };
+        match code {
+            ToolLength::Off => {
                 self.leave_tcp();
                 self.offsets.tool_length = 0.0;
+                block.take_integer('H')?;
             }
-            Some(431) => {
+            ToolLength::Given => {
                 let words = self.take_axes(block)?;
                 if words.iter().enumerate().any(|(axis, word)| axis != 2 && word.is_some()) {
                     return Err("G43.1: only Z is supported".to_owned());
@@ -104,14 +240,19 @@ impl State {
                 self.leave_tcp();
                 self.offsets.tool_length = words[2].ok_or("G43.1 requires Z, the tool length")?;
             }
-            Some(code) => {
+            _ => {
                 let length = match block.take_integer('H')? {
                     Some(0) => 0.0,
                     tool => self.tool_length(tool.unwrap_or(self.modal.tool))?,
                 };
                 self.leave_tcp();
                 match code {
-                    434 => self.enter_tcp(length)?,
+                    ToolLength::CenterPoint | ToolLength::CenterPointVector | ToolLength::CenterPoint234 => {
+                        self.enter_tcp(length)?;
+                        self.modal.has_tool_vectors = code == ToolLength::CenterPointVector;
+                    }
+                    ToolLength::Additional => self.offsets.tool_length += length,
+                    ToolLength::Negative => self.offsets.tool_length = -length,
                     _ => self.offsets.tool_length = length,
                 }
             }
@@ -119,13 +260,95 @@ impl State {
         Ok(())
     }
 
-    fn tool_length(&self, tool: u32) -> Outcome<f64> {
-        let length = self.options.tool_lengths.get(&tool).copied().or(self.options.default_tool_length);
-        length.ok_or_else(|| format!("tool {tool} is not in the tool table"))
+    /// Switches between tool center point control and positions of the axes, as the machines of LinuxCNC with switchable
+    /// kinematics do: M428, M429, M430.
+    pub(super) fn switch_kinematics(&mut self, codes: &Codes) -> Outcome<()> {
+        let Some(code) = codes.m.kinematics else { return Ok(()) };
+        let has_tables = self.options.kinematics.is_some() && (3..6).any(|axis| self.options.axes[axis]);
+        match (code, self.modal.tcp_length) {
+            (KinematicsSwitch::CenterPoint, None) if has_tables => self.enter_tcp(self.offsets.tool_length),
+            (KinematicsSwitch::Axes | KinematicsSwitch::User, Some(length)) => {
+                self.leave_tcp();
+                self.offsets.tool_length = length;
+                Ok(())
+            }
+            _ => {
+                self.note_without_effect(format!("M{}", code.number()));
+                Ok(())
+            }
+        }
+    }
+
+    /// Returns the length of a tool, m; a tool that is missing in the table has the default length, which is reported.
+    pub(super) fn tool_length(&mut self, number: u32) -> Outcome<f64> {
+        if let Some(tool) = self.options.tools.get(number) {
+            return Ok(tool.length);
+        }
+        let missing = || format!("tool {number} is not in the tool table");
+        let length = self.options.default_tool_length.ok_or_else(missing)?;
+        // The length of the machine file is given; 0 is an assumption.
+        if length == 0.0 {
+            self.assume(format!("{}: length 0", missing()));
+        }
+        Ok(length)
+    }
+
+    /// Starts or ends cutter radius compensation: G40, G41, G42, G41.1, G42.1.
+    pub(super) fn set_compensation(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
+        use CutterCompensation::{Left, LeftDiameter, Off, Right, RightDiameter};
+        let Some(code) = codes.g.cutter_compensation else {
+            if self.dialect != Dialect::LinuxCnc
+                && let Some(number) = block.take_integer('D')?
+            {
+                self.modal.radius_number = Some(number);
+            }
+            return Ok(());
+        };
+        let is_left = matches!(code, Left | LeftDiameter);
+        let radius = match code {
+            Off => {
+                if self.dialect != Dialect::LinuxCnc {
+                    block.skip("D");
+                }
+                return self.compensate(None);
+            }
+            LeftDiameter | RightDiameter => {
+                let diameter =
+                    block.take('D').ok_or("G41.1 and G42.1 require D, the diameter of the tool")?;
+                block.skip("L");
+                0.5 * diameter * self.modal.length
+            }
+            Left | Right => {
+                let mut number = block.take_integer('D')?;
+                if self.dialect.has_macro_b() && number.is_none() && codes.g.tool_length.is_none() {
+                    // Older controls have the radius in the table of H.
+                    number = block.take_integer('H')?;
+                }
+                self.modal.radius_number = number.or(self.modal.radius_number);
+                // LinuxCNC takes the tool in the spindle, other controls the last D.
+                let last = self.modal.radius_number.filter(|_| self.dialect != Dialect::LinuxCnc);
+                self.tool_radius(number.or(last).unwrap_or(self.modal.tool))
+            }
+        };
+        self.compensate(Some(Compensation { is_left, radius }))
+    }
+
+    /// Returns the radius of a tool, m; 0 for one that is missing in the table, which is reported.
+    pub(super) fn tool_radius(&mut self, number: u32) -> f64 {
+        match self.options.tools.get(number) {
+            Some(tool) => tool.radius,
+            None if number == 0 => 0.0,
+            None => {
+                self.assume(format!(
+                    "tool {number} is not in the tool table: radius 0, the contour is the path"
+                ));
+                0.0
+            }
+        }
     }
 
     /// Starts tool center point control: the position becomes the tip of the tool.
-    fn enter_tcp(&mut self, length: f64) -> Outcome<()> {
+    pub(super) fn enter_tcp(&mut self, length: f64) -> Outcome<()> {
         let transform = self.options.kinematics.as_ref();
         let transform = transform.ok_or("G43.4 requires a machine with kinematics; program G43")?;
         transform.tip(&mut self.position, length);
@@ -135,7 +358,7 @@ impl State {
     }
 
     /// Ends tool center point control: the position becomes that of the axes.
-    fn leave_tcp(&mut self) {
+    pub(super) fn leave_tcp(&mut self) {
         if let (Some(length), Some(transform)) = (self.modal.tcp_length.take(), &self.options.kinematics) {
             transform.axis_positions(&mut self.position, length);
         }
@@ -143,35 +366,65 @@ impl State {
 
     /// Moves through the programmed coordinates to a reference: G28, G30.
     pub(super) fn go_to_reference(&mut self, block: &mut LineWords, reference: usize) -> Outcome<()> {
-        self.require_axis_positions()?;
-        let has_words = block.has_axis();
-        let words = AXIS_LETTERS.map(|letter| block.get(letter).is_some());
-        let between = self.targets(block, false)?;
-        self.push_rapid(between)?;
+        self.finish_contour()?;
+        self.moves_in_machine_coordinates = true;
+        let number = if self.dialect.has_macro_b() { block.take_integer('P')? } else { None };
+        if number.is_some_and(|number| number > 2) {
+            self.assume("G30 P3 and P4: their references are that of P2".to_owned());
+        }
+        let increments = self.take_increments(block);
+        let mut between = self.targets(block)?;
+        let words = AXIS_LETTERS.map(|letter| block.was_given(letter));
+        let mut is_named = words;
+        for (axis, increment) in increments.into_iter().enumerate() {
+            if let Some(increment) = increment {
+                between[axis] += increment;
+                is_named[axis] = true;
+            }
+        }
+        let has_words = is_named.iter().any(|is_named| *is_named);
+        self.rapid_to(&between)?;
+        self.modal.between = between;
+        let tcp_length = self.modal.tcp_length;
+        self.leave_tcp();
         let mut end = self.position;
         for axis in 0..AXIS_COUNT {
-            if self.options.axes[axis] && (words[axis] || !has_words) {
+            if self.options.axes[axis] && (is_named[axis] || !has_words) {
                 end[axis] = self.options.references[reference][axis];
             }
         }
-        self.push_rapid(end)
+        self.push_rapid(end)?;
+        tcp_length.map_or(Ok(()), |length| self.enter_tcp(length))
+    }
+
+    /// Returns the increments of X, Y and Z by U, V and W on a machine of Fanuc and Haas without these axes, m.
+    pub(super) fn take_increments(&self, block: &mut LineWords) -> [Option<f64>; 3] {
+        if !self.dialect.has_macro_b() {
+            return [None; 3];
+        }
+        [6, 7, 8].map(|axis| match self.options.axes[axis] {
+            true => None,
+            false => block.take(AXIS_LETTERS[axis]).map(|value| value * self.modal.length),
+        })
     }
 
     /// Stores the position as a reference: G28.1, G30.1.
     pub(super) fn store_reference(&mut self, reference: usize) -> Outcome<()> {
-        self.require_axis_positions()?;
-        self.options.references[reference] = self.position;
+        self.finish_contour()?;
+        let mut position = self.position;
+        if let (Some(length), Some(transform)) = (self.modal.tcp_length, &self.options.kinematics) {
+            transform.axis_positions(&mut position, length);
+        }
+        self.options.references[reference] = position;
         Ok(())
     }
+}
 
-    /// Rejects axis positions with tool center point control.
-    pub(super) fn require_axis_positions(&self) -> Outcome<()> {
-        match self.modal.tcp_length {
-            None => Ok(()),
-            Some(_) => {
-                Err("axis positions (G28, G30, G53) with tool center point control: program G49 first"
-                    .to_owned())
-            }
-        }
+/// Returns the code of a work coordinate system by its index.
+pub fn system_name(index: usize) -> String {
+    match index {
+        0..6 => format!("G{}", 54 + index),
+        6..WORK_OFFSET_COUNT => format!("G59.{}", index - 5),
+        _ => format!("G54.1 P{}", index + 1 - WORK_OFFSET_COUNT),
     }
 }

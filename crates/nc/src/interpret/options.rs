@@ -1,15 +1,23 @@
 //! Options of the interpreter.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
+use std::path::PathBuf;
 
-use virtual_axes_core::config::{KinematicsConfig, MachineConfig};
-use virtual_axes_core::kinematics::Kinematics;
+use nalgebra::Matrix3;
+use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::kinematics::{Kinematics, ToolPose};
 
+use super::dialect::Dialect;
+use super::error::Outcome;
+use super::ignored::IgnoredCodes;
 use super::limits::REPEATED_LINES;
+use super::tools::ToolTable;
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Blend, Coordinates, PathControl};
 
-/// Number of work coordinate systems: G54 to G59.3.
+/// Number of work coordinate systems with codes of their own: G54 to G59.3.
 pub const WORK_OFFSET_COUNT: usize = 9;
+/// Number of additional work coordinate systems: G54.1 P1 and on.
+pub const ADDITIONAL_OFFSET_COUNT: usize = 300;
 
 /// Options of the interpreter: machine, offsets and tolerances that the program relies on.
 #[derive(Debug, Clone)]
@@ -18,22 +26,34 @@ pub struct InterpreterOptions {
     pub axes: [bool; AXIS_COUNT],
     /// Axis positions at the program start, m and rad.
     pub start: Coordinates,
-    /// Work offsets G54 to G59.3, m and rad.
-    pub work_offsets: [Coordinates; WORK_OFFSET_COUNT],
+    /// Work offsets G54 to G59.3 and G54.1 P1 to P300, m and rad.
+    pub work_offsets: Vec<Coordinates>,
+    /// Indices of the work offsets that are given; `None` if none is an assumption.
+    pub given_work_offsets: Option<BTreeSet<usize>>,
     /// Axis positions of G28 and G30, m and rad.
     pub references: [Coordinates; 2],
-    /// Tool length by tool number (H word), m.
-    pub tool_lengths: BTreeMap<u32, f64>,
-    /// Length of tools without entry in `tool_lengths`, m; `None` rejects them.
+    /// Dialect; `None` detects it from the content of the program.
+    pub dialect: Option<Dialect>,
+    /// Tool table: lengths (H word) and radii (D word).
+    pub tools: ToolTable,
+    /// Length of tools without entry in `tools`, m; `None` rejects them.
     pub default_tool_length: Option<f64>,
+    /// Duration of a tool change (M6), s.
+    pub tool_change_time: f64,
+    /// Duration of a change of the spindle speed, s.
+    pub spindle_time: f64,
     /// Path control mode at the program start.
     pub path_control: PathControl,
-    /// M codes that are accepted without effect.
-    pub ignored_m_codes: Vec<u32>,
+    /// G and M codes that are accepted without effect.
+    pub ignored: IgnoredCodes,
     /// True if lines that begin with a slash are skipped (block delete).
     pub skips_optional_lines: bool,
     /// Number of lines that loops and subprograms may repeat.
     pub repeated_lines: u64,
+    /// True if the interpreter continues after an error, for a report of all of them.
+    pub reports_all_errors: bool,
+    /// Folder with the files of subprograms; `None` for those in the program alone.
+    pub subprogram_folder: Option<PathBuf>,
     /// Kinematics for tool center point control; `None` rejects G43.4.
     pub kinematics: Option<TipTransform>,
 }
@@ -44,18 +64,24 @@ impl Default for InterpreterOptions {
         Self {
             axes: [true; AXIS_COUNT],
             start: [0.0; AXIS_COUNT],
-            work_offsets: [[0.0; AXIS_COUNT]; WORK_OFFSET_COUNT],
+            work_offsets: vec![[0.0; AXIS_COUNT]; WORK_OFFSET_COUNT + ADDITIONAL_OFFSET_COUNT],
+            given_work_offsets: None,
             references: [[0.0; AXIS_COUNT]; 2],
-            tool_lengths: BTreeMap::new(),
+            dialect: None,
+            tools: ToolTable::default(),
             default_tool_length: Some(0.0),
+            tool_change_time: 0.0,
+            spindle_time: 0.0,
             path_control: PathControl::Blend(Blend {
                 tolerance: None,
                 rotary_tolerance: None,
                 merge_tolerance: None,
             }),
-            ignored_m_codes: Vec::new(),
+            ignored: IgnoredCodes::default(),
             skips_optional_lines: false,
             repeated_lines: REPEATED_LINES,
+            reports_all_errors: false,
+            subprogram_folder: None,
             kinematics: None,
         }
     }
@@ -63,7 +89,7 @@ impl Default for InterpreterOptions {
 
 impl InterpreterOptions {
     /// Returns the options for a machine: its axes by the letters of their names, its kinematics, the origin of its
-    /// workpiece frame as G54, and its tool length for all tools. The program starts with all axes at 0.
+    /// workpiece frame as all work offsets, and its tool length for all tools. The program starts with all axes at 0.
     pub fn for_machine(machine: &MachineConfig) -> Self {
         let geometry = *machine.kinematics();
         let transform = TipTransform::new(machine);
@@ -71,7 +97,10 @@ impl InterpreterOptions {
         for axis in transform.joints.iter().flatten() {
             options.axes[*axis] = true;
         }
-        options.work_offsets[0][..3].copy_from_slice(&geometry.workpiece);
+        for offset in &mut options.work_offsets {
+            offset[..3].copy_from_slice(&geometry.workpiece);
+        }
+        options.given_work_offsets = Some([0].into());
         options.default_tool_length = Some(geometry.tool_length);
         options.kinematics = Some(transform);
         options
@@ -95,7 +124,8 @@ impl InterpreterOptions {
 #[derive(Debug, Clone)]
 pub struct TipTransform {
     kinematics: Kinematics,
-    geometry: KinematicsConfig,
+    /// Origin of the workpiece frame in the machine frame, m.
+    workpiece: [f64; 3],
     /// Index in [`Coordinates`] of each joint of the machine.
     joints: Vec<Option<usize>>,
 }
@@ -107,7 +137,7 @@ impl TipTransform {
             AXIS_LETTERS.iter().position(|letter| name.eq_ignore_ascii_case(&letter.to_string()))
         };
         let joints = machine.axes().iter().map(|axis| letter(axis.name())).collect();
-        Self { kinematics: Kinematics::new(machine), geometry: *machine.kinematics(), joints }
+        Self { kinematics: Kinematics::new(machine), workpiece: machine.kinematics().workpiece, joints }
     }
 
     /// Computes the joint positions of the machine, in its order, at a position of a motion. `tcp_length` is
@@ -126,28 +156,84 @@ impl TipTransform {
         position
     }
 
+    /// Computes the tip of a tool at axis positions, in machine coordinates with the tables at 0, m and rad.
+    pub fn tip_of(&self, axes: &Coordinates, tool_length: f64) -> Coordinates {
+        let mut tip = *axes;
+        self.tip(&mut tip, tool_length);
+        tip
+    }
+
+    /// Computes the axis positions of A, B and C that give the tool a direction in the workpiece frame, from the tip to the
+    /// spindle; `near` are the present positions, and X, Y and Z of the result are those of `near`.
+    ///
+    /// # Errors
+    ///
+    /// A direction that the machine cannot reach.
+    pub(super) fn oriented(&self, direction: [f64; 3], near: &Coordinates) -> Outcome<Coordinates> {
+        let joints: Vec<f64> = self.joints.iter().map(|axis| axis.map_or(0.0, |axis| near[axis])).collect();
+        let mut out = joints.clone();
+        let pose = ToolPose { axis: direction.into(), ..self.kinematics.forward(&joints) };
+        self.kinematics.inverse(&pose, &joints, &mut out).map_err(|error| error.to_string())?;
+        let mut found = *near;
+        for (axis, value) in self.joints.iter().zip(out) {
+            if let Some(axis @ 3..6) = axis {
+                found[*axis] = value;
+            }
+        }
+        Ok(found)
+    }
+
+    /// Computes the axis positions of [`oriented`](Self::oriented), with the sign of `direction` at the first rotary axis if
+    /// the travel limits allow it.
+    pub(super) fn oriented_towards(
+        &self,
+        axis: [f64; 3],
+        near: &Coordinates,
+        direction: f64,
+    ) -> Outcome<Coordinates> {
+        let found = self.oriented(axis, near)?;
+        let first = (3..6).find(|axis| self.joints.contains(&Some(*axis)));
+        let Some(first) = first.filter(|first| direction * found[*first] < 0.0) else { return Ok(found) };
+        // The other solution has the opposite angle, and the second rotary axis half a turn away.
+        let mut other = found;
+        other[first] = -other[first];
+        (first + 1..6).for_each(|axis| other[axis] += std::f64::consts::PI);
+        let other = self.oriented(axis, &other)?;
+        Ok(if direction * other[first] > 0.0 { other } else { found })
+    }
+
+    /// Returns the orientation of the tool in the workpiece at axis positions; its third column is the tool axis.
+    pub(super) fn orientation(&self, position: &Coordinates) -> Matrix3<f64> {
+        self.kinematics.orientation(&self.joints(position, None)).to_rotation_matrix().into_inner()
+    }
+
+    /// Returns the direction of the tool axis in the workpiece frame, from the tip to the spindle.
+    pub(super) fn direction(&self, position: &Coordinates) -> [f64; 3] {
+        let joints: Vec<f64> =
+            self.joints.iter().map(|axis| axis.map_or(0.0, |axis| position[axis])).collect();
+        self.kinematics.forward(&joints).axis.into()
+    }
+
     /// Converts axis positions to the tip of a tool, in machine coordinates with the tables at 0.
     pub(super) fn tip(&self, position: &mut Coordinates, tool_length: f64) {
-        position[2] += self.geometry.tool_length - tool_length;
-        self.convert(position, Kinematics::joints_to_tip);
-        for (value, origin) in position.iter_mut().zip(self.geometry.workpiece) {
+        self.convert(position, tool_length, Kinematics::joints_to_tip);
+        for (value, origin) in position.iter_mut().zip(self.workpiece) {
             *value += origin;
         }
     }
 
     /// Converts the tip of a tool to axis positions. It is the inverse of [`tip`](Self::tip).
     pub(super) fn axis_positions(&self, position: &mut Coordinates, tool_length: f64) {
-        for (value, origin) in position.iter_mut().zip(self.geometry.workpiece) {
+        for (value, origin) in position.iter_mut().zip(self.workpiece) {
             *value -= origin;
         }
-        self.convert(position, Kinematics::tip_to_joints);
-        position[2] -= self.geometry.tool_length - tool_length;
+        self.convert(position, tool_length, Kinematics::tip_to_joints);
     }
 
-    fn convert(&self, position: &mut Coordinates, conversion: fn(&Kinematics, &mut [f64])) {
+    fn convert(&self, position: &mut Coordinates, tool_length: f64, conversion: fn(&Kinematics, &mut [f64])) {
         let value = |axis: &Option<usize>| axis.map_or(0.0, |axis| position[axis]);
         let mut joints: Vec<f64> = self.joints.iter().map(value).collect();
-        conversion(&self.kinematics, &mut joints);
+        conversion(&self.kinematics.with_tool_length(tool_length), &mut joints);
         for (axis, value) in self.joints.iter().zip(joints) {
             if let Some(axis) = axis {
                 position[*axis] = value;

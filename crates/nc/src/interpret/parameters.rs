@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::dialect::Dialect;
 use super::error::Outcome;
 use super::limits::MAX_NAMED;
 
@@ -9,25 +10,28 @@ use super::limits::MAX_NAMED;
 pub(super) const FIRST_OF_CONTROL: usize = 5000;
 /// Largest number of a parameter.
 const LAST: usize = 5602;
-/// Number of numbered parameters that are local to a subprogram, from 1.
-pub(super) const LOCALS: usize = 30;
+/// Last number of a variable of macro B.
+const LAST_VARIABLE: usize = 99_999;
+/// First variable of macro B that belongs to the control.
+pub(super) const FIRST_VARIABLE_OF_CONTROL: usize = 1000;
+/// Largest number of arguments of a subprogram; of macro B, which has more local variables than LinuxCNC.
+pub(super) const LOCALS: usize = 33;
+/// Number of numbered parameters that are local to a subprogram of LinuxCNC, from 1.
+const LINUXCNC_LOCALS: usize = 30;
+/// Largest number of variables of the control that a program sets.
+const MAX_SET: usize = 100_000;
 /// Tolerance on integers, as LinuxCNC has it.
 const INTEGER: f64 = 1e-4;
-
-/// Values that an expression reads.
-pub(super) trait Variables {
-    /// Returns the value of `#number`.
-    fn numbered(&self, number: usize) -> Outcome<f64>;
-    /// Returns the value of `#<name>`.
-    fn named(&self, name: &str) -> Outcome<f64>;
-    /// Returns true if `#<name>` has a value.
-    fn is_defined(&self, name: &str) -> bool;
-}
 
 /// Values set by the program.
 #[derive(Debug)]
 pub(super) struct ParameterValues {
+    /// Values from #0 on; NaN is a variable of macro B without value.
     numbered: Vec<f64>,
+    /// Variables of the control that the program has set.
+    of_control: HashMap<usize, f64>,
+    /// Number of local parameters of a subprogram.
+    locals: usize,
     global: HashMap<String, f64>,
     local: HashMap<String, f64>,
     /// Number of named parameters in `global`, `local` and the saved scopes.
@@ -42,14 +46,37 @@ pub(super) struct CallerScope {
 }
 
 impl ParameterValues {
-    pub(super) fn new() -> Self {
-        let numbered = vec![0.0; FIRST_OF_CONTROL];
-        Self { numbered, global: HashMap::new(), local: HashMap::new(), names: 0 }
+    pub(super) fn new(dialect: Dialect) -> Self {
+        let (initial, locals) =
+            if dialect.has_macro_b() { (f64::NAN, LOCALS) } else { (0.0, LINUXCNC_LOCALS) };
+        let numbered = vec![initial; FIRST_OF_CONTROL];
+        Self {
+            numbered,
+            of_control: HashMap::new(),
+            locals,
+            global: HashMap::new(),
+            local: HashMap::new(),
+            names: 0,
+        }
     }
 
     /// Returns the value of a numbered parameter below those of the control.
     pub(super) fn numbered(&self, number: usize) -> Option<f64> {
         self.numbered.get(number).copied()
+    }
+
+    /// Returns the value of a variable of the control that the program has set.
+    pub(super) fn of_control(&self, number: usize) -> Option<f64> {
+        self.of_control.get(&number).copied()
+    }
+
+    /// Sets a variable of the control without further effect.
+    pub(super) fn set_of_control(&mut self, number: usize, value: f64) -> Outcome<()> {
+        if self.of_control.len() >= MAX_SET && !self.of_control.contains_key(&number) {
+            return Err(format!("#{number}: the program sets more than {MAX_SET} variables of the control"));
+        }
+        self.of_control.insert(number, value);
+        Ok(())
     }
 
     /// Returns the value of a named parameter.
@@ -86,9 +113,9 @@ impl ParameterValues {
 
     /// Starts the scope of a subprogram with arguments, and returns the scope of its caller.
     pub(super) fn enter(&mut self, arguments: &[f64; LOCALS]) -> CallerScope {
-        let locals = &mut self.numbered[1..=LOCALS];
+        let locals = &mut self.numbered[1..=self.locals];
         let numbered = locals.to_vec();
-        locals.copy_from_slice(arguments);
+        locals.copy_from_slice(&arguments[..self.locals]);
         CallerScope { numbered, named: std::mem::take(&mut self.local) }
     }
 
@@ -96,7 +123,7 @@ impl ParameterValues {
     pub(super) fn leave(&mut self, caller: CallerScope) {
         self.names -= self.local.len();
         self.local = caller.named;
-        self.numbered[1..=LOCALS].copy_from_slice(&caller.numbered);
+        self.numbered[1..=self.locals].copy_from_slice(&caller.numbered);
     }
 }
 
@@ -108,7 +135,10 @@ pub(super) fn integer(value: f64) -> Option<u32> {
 }
 
 /// Returns the number of a parameter.
-pub(super) fn parameter_number(value: f64) -> Outcome<usize> {
-    let number = integer(value).map(|number| number as usize).filter(|number| (1..=LAST).contains(number));
-    number.ok_or_else(|| format!("#{value}: the number of a parameter is 1 to {LAST}"))
+pub(super) fn parameter_number(value: f64, dialect: Dialect) -> Outcome<usize> {
+    let numbers = if dialect.has_macro_b() { 0..=LAST_VARIABLE } else { 1..=LAST };
+    let number = integer(value).map(|number| number as usize).filter(|number| numbers.contains(number));
+    number.ok_or_else(|| {
+        format!("#{value}: the number of a parameter is {} to {}", numbers.start(), numbers.end())
+    })
 }

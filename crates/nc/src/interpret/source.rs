@@ -1,17 +1,27 @@
 //! Lines of a program, with bounded memory and a bounded number of repetitions.
 
-use std::io::{BufRead, Read, Seek, SeekFrom};
+use std::io::{BufRead, Cursor, Read, Seek, SeekFrom};
 
 use super::error::Outcome;
 use super::limits::{MAX_IDLE_LINES, MAX_LINE};
 
+/// Largest number of files of subprograms.
+const MAX_FILES: usize = 100;
+
 /// Start of a line in the source.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct Place {
+    /// Number of the file: 0 is the program.
+    file: usize,
     /// Bytes before the line.
     offset: u64,
     /// Number of lines before the line.
     lines: usize,
+}
+
+impl Place {
+    /// Start of the program.
+    pub(super) const START: Self = Self { file: 0, offset: 0, lines: 0 };
 }
 
 /// Source of lines.
@@ -19,6 +29,10 @@ pub(super) struct Place {
 pub(super) struct LineSource<R> {
     reader: R,
     next: Place,
+    /// Files of subprograms: text, and its place that is read next.
+    files: Vec<Cursor<Vec<u8>>>,
+    /// Line of the program that was read last, from 1.
+    program_line: usize,
     /// End of the farthest line that was read, bytes.
     farthest: u64,
     /// Number of lines that jumps may repeat, in all and from now on.
@@ -28,25 +42,44 @@ pub(super) struct LineSource<R> {
     idle_lines: u64,
     /// True after the first line with text.
     has_text: bool,
+    /// True after an error from which reading does not continue.
+    has_failed: bool,
 }
 
 impl<R: BufRead + Seek> LineSource<R> {
     pub(super) fn new(reader: R, repeated_lines: u64) -> Self {
-        let next = Place { offset: 0, lines: 0 };
+        let next = Place::START;
         Self {
             reader,
             next,
+            files: Vec::new(),
+            program_line: 1,
             farthest: 0,
             repeated_lines,
             repeats_left: repeated_lines,
             idle_lines: 0,
             has_text: false,
+            has_failed: false,
         }
     }
 
-    /// Returns the number of the line that was read last, from 1.
+    /// Returns the number of the line of the program that was read last, from 1: in other files, that of the call.
     pub(super) fn line(&self) -> usize {
-        self.next.lines.max(1)
+        self.program_line
+    }
+
+    /// Returns the line that was read last of a file of a subprogram, from 1; `None` in the program.
+    pub(super) fn line_of_file(&self) -> Option<usize> {
+        (self.next.file > 0).then_some(self.next.lines.max(1))
+    }
+
+    /// Adds the text of a file, and returns its start.
+    pub(super) fn add_file(&mut self, text: Vec<u8>) -> Outcome<Place> {
+        if self.files.len() >= MAX_FILES {
+            return Err(format!("the program calls more than {MAX_FILES} files"));
+        }
+        self.files.push(Cursor::new(text));
+        Ok(Place { file: self.files.len(), ..Place::START })
     }
 
     /// Returns the start of the next line.
@@ -56,15 +89,24 @@ impl<R: BufRead + Seek> LineSource<R> {
 
     /// Continues at `place`.
     pub(super) fn jump(&mut self, place: Place) -> Outcome<()> {
-        self.reader.seek(SeekFrom::Start(place.offset)).map_err(|error| error.to_string())?;
+        let start = SeekFrom::Start(place.offset);
+        match place.file.checked_sub(1).and_then(|index| self.files.get_mut(index)) {
+            Some(file) => file.seek(start),
+            None => self.reader.seek(start),
+        }
+        .map_err(|error| error.to_string())?;
+        self.has_text &= place.offset > 0;
         self.next = place;
+        if place.file == 0 {
+            self.program_line = place.lines.max(1);
+        }
         Ok(())
     }
 
     /// Continues at the first line.
     pub(super) fn rewind(&mut self) -> Outcome<()> {
         self.has_text = false;
-        self.jump(Place { offset: 0, lines: 0 })
+        self.jump(Place::START)
     }
 
     /// Reads the next line into `line`, without its end; returns false at the end of the program.
@@ -73,11 +115,14 @@ impl<R: BufRead + Seek> LineSource<R> {
     ///
     /// A line that is too long, too many repeated lines, or an error of the operating system.
     pub(super) fn read(&mut self, line: &mut Vec<u8>) -> Outcome<bool> {
+        self.has_failed = true;
         if !self.read_raw(line)? {
+            self.has_failed = false;
             return Ok(false);
         }
-        if self.next.offset > self.farthest {
+        if self.next.file == 0 && self.next.offset > self.farthest {
             self.farthest = self.next.offset;
+            self.has_failed = false;
             return Ok(true);
         }
         self.idle_lines += 1;
@@ -91,7 +136,13 @@ impl<R: BufRead + Seek> LineSource<R> {
             ));
         }
         self.repeats_left -= 1;
+        self.has_failed = false;
         Ok(true)
+    }
+
+    /// Returns true after an error from which reading does not continue.
+    pub(super) fn has_failed(&self) -> bool {
+        self.has_failed
     }
 
     /// Counts the repeated lines without a step from 0.
@@ -104,17 +155,20 @@ impl<R: BufRead + Seek> LineSource<R> {
         loop {
             line.clear();
             let limit = MAX_LINE as u64 + 2;
-            let read = self
-                .reader
-                .by_ref()
-                .take(limit)
-                .read_until(b'\n', line)
-                .map_err(|error| error.to_string())?;
+            let read = match self.next.file.checked_sub(1).and_then(|index| self.files.get_mut(index)) {
+                Some(file) => file.take(limit).read_until(b'\n', line),
+                None => self.reader.by_ref().take(limit).read_until(b'\n', line),
+            }
+            .map_err(|error| error.to_string())?;
             if read == 0 {
                 return Ok(false);
             }
             let is_first = self.next.offset == 0;
-            self.next = Place { offset: self.next.offset + read as u64, lines: self.next.lines + 1 };
+            let Place { file, offset, lines } = self.next;
+            self.next = Place { file, offset: offset + read as u64, lines: lines + 1 };
+            if file == 0 {
+                self.program_line = lines + 1;
+            }
             while matches!(line.last(), Some(b'\n' | b'\r')) {
                 line.pop();
             }
@@ -125,12 +179,15 @@ impl<R: BufRead + Seek> LineSource<R> {
                 line.drain(..3);
             }
             let text = line.trim_ascii();
-            // A percent sign encloses the program: before its first line with text, and after its last.
-            if let Some(rest) = text.strip_prefix(b"%") {
-                if !is_comment(rest) {
-                    return Err("% encloses the program and is alone on its line".to_owned());
-                }
+            // A percent sign encloses the program: before its first line with text, which may follow it, and after its
+            // last. Heads %_N_ of Sinumerik are lines.
+            if let Some(rest) = text.strip_prefix(b"%")
+                && !rest.get(..3).is_some_and(|head| head.eq_ignore_ascii_case(b"_N_"))
+            {
                 if self.has_text {
+                    if !is_comment(rest) {
+                        return Err("% encloses the program and is alone on its line".to_owned());
+                    }
                     return Ok(false);
                 }
                 self.has_text = true;

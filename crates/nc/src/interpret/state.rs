@@ -1,24 +1,42 @@
 //! State of the interpreter between lines: position, offsets and modes.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
+use nalgebra::{Matrix3, Vector3};
+use virtual_axes_core::text::escaped;
 use virtual_axes_core::units::{DEGREE, MILLIMETER};
 
-use super::cycles::Cycle;
+use super::codes::{FeedMode, Motion, PlaneCode};
+use super::contour::{Contour, Corner};
+use super::dialect::Dialect;
 use super::error::Outcome;
+use super::frame::CoordinateFrame;
 use super::options::InterpreterOptions;
-use super::parameters::{FIRST_OF_CONTROL, ParameterValues, Variables};
-use super::spline::OpenSpline;
-use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates, PathControl, Plane, ProgramEvent, ProgramStep};
+use super::parameters::{FIRST_OF_CONTROL, FIRST_VARIABLE_OF_CONTROL, LOCALS, ParameterValues};
+use super::report::{InterpretationReport, count};
+use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates, PathControl, Plane, ProgramStep};
+
+/// Distance below which an axis stays in its place, m and rad.
+const ROUNDING: f64 = 1e-13;
 
 /// State of the interpreter between lines.
 #[derive(Debug)]
 pub(super) struct State {
     pub options: InterpreterOptions,
+    /// Words without effect, assumptions and errors.
+    pub report: InterpretationReport,
     pub parameters: ParameterValues,
     /// End of the last motion: axis positions, or the tool tip if `modal.tcp_length` is set.
     pub position: Coordinates,
     pub offsets: Offsets,
+    /// Dialect of the program.
+    pub dialect: Dialect,
+    /// True if the options name the dialect, false if it was detected.
+    pub has_given_dialect: bool,
+    /// Programmable frame: scaling, mirroring, rotation.
+    pub frame: CoordinateFrame,
+    /// Tilted plane (G68.2) in the work coordinate system, which the table angles of each position place.
+    pub tilt: Option<CoordinateFrame>,
     pub modal: Modal,
     /// Source line, from 1.
     pub line: usize,
@@ -28,28 +46,46 @@ pub(super) struct State {
     pub returned: Option<f64>,
     /// NURBS that later lines complete.
     pub spline: Option<OpenSpline>,
+    /// Steps that wait for the next motion.
+    pub contour: Contour,
+    /// Corner between the next motion and the one after it.
+    pub corner: Option<Corner>,
+    /// Macro that follows each motion (G66), and the depth of calls at which it was programmed.
+    pub modal_macro: Option<(Jump, usize)>,
+    /// Modes that M70 has saved.
+    pub saved_modes: Option<Box<Modal>>,
     /// Jump that the line requests.
     pub jump: Option<Jump>,
     /// Steps of the line.
     pub steps: VecDeque<ProgramStep>,
+    /// True if the motions of the line are in machine coordinates.
+    pub moves_in_machine_coordinates: bool,
     /// True after the program end.
     pub has_ended: bool,
 }
 
 /// Jump of the subprograms that are called by number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) enum Jump {
-    /// M98.
+    /// M98: subprogram by number.
     Call { program: u32, times: u32 },
-    /// M99.
-    Return,
+    /// M97: lines from a number on.
+    Local { number: u32, times: u32 },
+    /// G65 and G66: subprogram with arguments.
+    Macro { program: u32, times: u32, arguments: Box<[f64; LOCALS]> },
+    /// M99, with the line number to return to.
+    Return { number: Option<u32> },
+    /// GOTO.
+    Goto { number: u32 },
 }
 
 /// Offsets between programmed coordinates and the position, m and rad.
 #[derive(Debug)]
 pub(super) struct Offsets {
-    /// Index of the work coordinate system.
+    /// Index of the work coordinate system: 0 is G54.
     pub active: usize,
+    /// Rotations of work coordinate systems about Z (G10 L2 R), rad.
+    pub rotations: BTreeMap<usize, f64>,
     /// Offset of G92 or G52.
     pub shift: Coordinates,
     /// Offset that G92.3 restores.
@@ -59,10 +95,9 @@ pub(super) struct Offsets {
 }
 
 /// Modes that stay in effect until a line changes them.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Modal {
-    /// G code of the motion mode, in tenths.
-    pub motion: Option<u16>,
+    pub motion: Option<Motion>,
     pub plane: Plane,
     /// Canned cycle of the motion mode.
     pub cycle: Option<Cycle>,
@@ -88,23 +123,49 @@ pub(super) struct Modal {
     pub flood: bool,
     /// Tool length of tool center point control, m.
     pub tcp_length: Option<f64>,
+    /// True if I, J and K are the direction of the tool (G43.5).
+    pub has_tool_vectors: bool,
+    /// Number of the offset with the tool radius (D).
+    pub radius_number: Option<u32>,
+    /// Polar coordinates (G16): radius, m, and angle, degrees.
+    pub polar: Option<[f64; 2]>,
+    /// Parts of the programmable frame: scaling (G51), mirroring (G51.1), rotation (G68).
+    pub frames: [CoordinateFrame; 3],
+    /// Programmed point of the last G28, m and rad.
+    pub between: Coordinates,
+    /// True with constant surface speed (G96).
+    pub has_surface_speed: bool,
 }
 
-/// Meaning of the F word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum FeedMode {
-    /// G93.
-    InverseTime,
-    /// G94.
-    PerMinute,
-    /// G95.
-    PerRevolution,
+/// Canned cycle with the words that stay in effect for its next lines.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cycle {
+    pub code: Motion,
+    /// Programmed coordinate of the drilling axis before the first line of the cycle, m.
+    pub initial: f64,
+    /// Word R, m.
+    pub retract: Option<f64>,
+    /// Word of the depth, m.
+    pub bottom: Option<f64>,
+    /// Dwell P, s.
+    pub dwell: Option<f64>,
+    /// Peck Q, m.
+    pub peck: Option<f64>,
+    /// Words I, J and K: first peck, its reduction and the least peck, or a lateral shift, m.
+    pub extra: [Option<f64>; 3],
+}
+
+/// NURBS between G5.2 and G5.3.
+#[derive(Debug)]
+pub(super) struct OpenSpline {
+    pub order: usize,
+    pub control: Vec<([f64; 2], f64)>,
 }
 
 impl State {
     pub(super) fn new(options: InterpreterOptions) -> Self {
         let modal = Modal {
-            motion: None,
+            motion: options.dialect.filter(|dialect| *dialect != Dialect::LinuxCnc).map(|_| Motion::Rapid),
             plane: Plane::Xy,
             cycle: None,
             retracts_to_initial: true,
@@ -122,27 +183,49 @@ impl State {
             mist: false,
             flood: false,
             tcp_length: None,
+            has_tool_vectors: false,
+            radius_number: None,
+            polar: None,
+            frames: [CoordinateFrame::identity(); 3],
+            between: [0.0; AXIS_COUNT],
+            has_surface_speed: false,
         };
         let none = [0.0; AXIS_COUNT];
         Self {
-            parameters: ParameterValues::new(),
+            report: InterpretationReport::default(),
+            parameters: ParameterValues::new(options.dialect.unwrap_or_default()),
             position: options.start,
-            offsets: Offsets { active: 0, shift: none, saved_shift: none, tool_length: 0.0 },
+            offsets: Offsets {
+                active: 0,
+                rotations: BTreeMap::new(),
+                shift: none,
+                saved_shift: none,
+                tool_length: 0.0,
+            },
+            dialect: options.dialect.unwrap_or_default(),
+            has_given_dialect: false,
+            frame: CoordinateFrame::identity(),
+            tilt: None,
             modal,
             line: 1,
             calls: 0,
             returned: None,
             spline: None,
+            contour: Contour::default(),
+            corner: None,
+            modal_macro: None,
+            saved_modes: None,
             jump: None,
             steps: VecDeque::new(),
+            moves_in_machine_coordinates: false,
             has_ended: false,
             options,
         }
     }
 
-    /// Appends an event to the steps.
-    pub(super) fn push_event(&mut self, event: ProgramEvent) {
-        self.steps.push_back(ProgramStep::Event { line: self.line, event });
+    /// Returns true if lengths are in millimeters.
+    pub(super) fn is_metric(&self) -> bool {
+        self.modal.length == MILLIMETER
     }
 
     /// Returns the unit of an axis, m or rad.
@@ -150,7 +233,7 @@ impl State {
         if is_rotary(axis) { DEGREE } else { self.modal.length }
     }
 
-    /// Returns the position of an axis at programmed coordinate 0, m or rad.
+    /// Returns the position of an axis at programmed coordinate 0 without rotations and scaling, m or rad.
     pub(super) fn origin(&self, axis: usize) -> f64 {
         let work = self.options.work_offsets[self.offsets.active][axis];
         let tool = if axis == 2 { self.offsets.tool_length } else { 0.0 };
@@ -159,7 +242,94 @@ impl State {
 
     /// Returns the programmed coordinate of the position, in units of the program.
     pub(super) fn coordinate(&self, axis: usize) -> f64 {
-        (self.position[axis] - self.origin(axis)) / self.unit(axis)
+        self.programmed()[axis] / self.unit(axis)
+    }
+
+    /// Adds an assumption to the report.
+    pub(super) fn assume(&mut self, text: String) {
+        count(&mut self.report.assumptions, text, self.line);
+    }
+
+    /// Adds a code without effect to the report.
+    pub(super) fn note_without_effect(&mut self, name: String) {
+        count(&mut self.report.without_effect, name, self.line);
+    }
+
+    /// Reports an error and continues, if the options require a report of all errors.
+    pub(super) fn reject(&mut self, reason: String) -> Outcome<()> {
+        if !self.options.reports_all_errors {
+            return Err(reason);
+        }
+        count(&mut self.report.errors, escaped(&reason), self.line);
+        Ok(())
+    }
+
+    /// Returns the map from programmed coordinates X, Y and Z to the position, m.
+    pub(super) fn map(&self) -> CoordinateFrame {
+        self.map_with(&self.position)
+    }
+
+    /// Returns the map with A, B and C at the axis positions of `at`.
+    fn map_with(&self, at: &Coordinates) -> CoordinateFrame {
+        let (Some(tilt), Some(kinematics), None) =
+            (&self.tilt, &self.options.kinematics, self.modal.tcp_length)
+        else {
+            return self.plane_map(self.offsets.tool_length);
+        };
+        // The tables carry the tilted plane.
+        let placed = |point: Vector3<f64>| {
+            let mut position = *at;
+            position[..3].copy_from_slice(point.as_slice());
+            kinematics.axis_positions(&mut position, self.offsets.tool_length);
+            Vector3::from_column_slice(&position[..3])
+        };
+        let origin = placed(Vector3::zeros());
+        let columns = [0, 1, 2].map(|axis| placed(Vector3::ith(axis, 1.0)) - origin);
+        let tables = CoordinateFrame { linear: Matrix3::from_columns(&columns), origin };
+        tables.then(&self.plane_map_of(0.0, &tilt.then(&self.frame)))
+    }
+
+    fn plane_map(&self, tool_length: f64) -> CoordinateFrame {
+        match &self.tilt {
+            Some(tilt) => self.plane_map_of(tool_length, &tilt.then(&self.frame)),
+            None => self.plane_map_of(tool_length, &self.frame),
+        }
+    }
+
+    fn plane_map_of(&self, tool_length: f64, frame: &CoordinateFrame) -> CoordinateFrame {
+        let vector = |coordinates: &Coordinates| Vector3::from_column_slice(&coordinates[..3]);
+        let system = self.offsets.active;
+        let tool = Vector3::new(0.0, 0.0, tool_length);
+        let work = CoordinateFrame::shift(vector(&self.options.work_offsets[system]) + tool);
+        let rotation = self.offsets.rotations.get(&system).copied().unwrap_or(0.0);
+        let shift = vector(&self.offsets.shift);
+        let outer = match rotation == 0.0 {
+            true => CoordinateFrame::shift(work.origin + shift),
+            false => work.then(&CoordinateFrame::rotation(2, rotation)).then(&CoordinateFrame::shift(shift)),
+        };
+        if frame.is_identity() { outer } else { outer.then(frame) }
+    }
+
+    /// Returns the programmed coordinates of the position, m and rad.
+    pub(super) fn programmed(&self) -> Coordinates {
+        let mut programmed: Coordinates = std::array::from_fn(|axis| self.position[axis] - self.origin(axis));
+        let point = self.map().invert(&Vector3::from_column_slice(&self.position[..3]));
+        programmed[..3].copy_from_slice(point.as_slice());
+        programmed
+    }
+
+    /// Returns the position at programmed coordinates, m and rad. An axis that does not move keeps its value without
+    /// rounding.
+    pub(super) fn position_at(&self, programmed: &Coordinates) -> Coordinates {
+        let mut position: Coordinates = std::array::from_fn(|axis| programmed[axis] + self.origin(axis));
+        let point = self.map_with(&position).apply(&Vector3::from_column_slice(&programmed[..3]));
+        position[..3].copy_from_slice(point.as_slice());
+        for (value, before) in position.iter_mut().zip(self.position) {
+            if (*value - before).abs() < ROUNDING {
+                *value = before;
+            }
+        }
+        position
     }
 
     /// Returns a parameter of the control; offsets are in mm and degrees, the unit of the control.
@@ -180,7 +350,8 @@ impl State {
             5400 => Some(f64::from(self.modal.tool)),
             5401..=5409 => tool.get(number - 5401).map(|length| length / MILLIMETER).or(Some(0.0)),
             5420..=5428 => Some(self.coordinate(number - 5420)),
-            _ => None,
+            5601..=5602 => None,
+            _ => Some(self.parameters.of_control(number).unwrap_or(0.0)),
         }
     }
 
@@ -196,16 +367,29 @@ impl State {
         }
         match name {
             "_line" => Some(self.line as f64),
-            "_motion_mode" => Some(modal.motion.map_or(800.0, f64::from)),
-            "_plane" => Some(match modal.plane {
-                Plane::Xy => 170.0,
-                Plane::Zx => 180.0,
-                Plane::Yz => 190.0,
+            "_task"
+            | "_spindle_css_mode"
+            | "_ijk_absolute_mode"
+            | "_lathe_diameter_mode"
+            | "_adaptive_feed"
+            | "_feed_hold"
+            | "_current_pocket"
+            | "_selected_pocket" => Some(0.0),
+            "_spindle_rpm_mode" | "_lathe_radius_mode" | "_feed_override" | "_speed_override" => Some(1.0),
+            "_vmajor" => Some(2.9),
+            "_vminor" => Some(0.0),
+            "_retract_old_z" => flag(modal.retracts_to_initial),
+            "_retract_r_plane" => flag(!modal.retracts_to_initial),
+            "_motion_mode" => Some(f64::from(modal.motion.unwrap_or(Motion::Cancel).number())),
+            "_plane" => Some(f64::from(match modal.plane {
+                Plane::Xy => PlaneCode::Xy.number(),
+                Plane::Zx => PlaneCode::Zx.number(),
+                Plane::Yz => PlaneCode::Yz.number(),
+            })),
+            "_coord_system" => Some(match self.offsets.active {
+                index @ 0..6 => 540.0 + 10.0 * index as f64,
+                index => 585.0 + index as f64,
             }),
-            "_coord_system" => {
-                let active = self.offsets.active;
-                Some(if active < 6 { 540.0 + 10.0 * active as f64 } else { 585.0 + active as f64 })
-            }
             "_metric" => flag(modal.length == MILLIMETER),
             "_imperial" => flag(modal.length != MILLIMETER),
             "_incremental" => flag(modal.is_incremental),
@@ -227,25 +411,27 @@ impl State {
             _ => None,
         }
     }
-}
 
-impl Variables for State {
-    fn numbered(&self, number: usize) -> Outcome<f64> {
+    /// Returns the value of `#number`.
+    pub(super) fn numbered(&self, number: usize) -> Outcome<f64> {
+        if self.dialect.has_macro_b() && number >= FIRST_VARIABLE_OF_CONTROL {
+            return Ok(self.control_variable(number));
+        }
         let value = match number < FIRST_OF_CONTROL {
             true => self.parameters.numbered(number),
             false => self.control_parameter(number),
         };
-        let supported =
-            "#1 to #4999, #5161 to #5169, #5181 to #5189, #5210 to #5389, #5400 to #5409, #5420 to #5428";
-        value.ok_or_else(|| format!("#{number} is not supported; supported: {supported}"))
+        value.ok_or_else(|| format!("#{number} is not supported; supported: #1 to #5600"))
     }
 
-    fn named(&self, name: &str) -> Outcome<f64> {
+    /// Returns the value of `#<name>`.
+    pub(super) fn named(&self, name: &str) -> Outcome<f64> {
         let value = self.control_name(name).or_else(|| self.parameters.named(name));
         value.ok_or_else(|| format!("#<{name}> has no value: set it before it is used"))
     }
 
-    fn is_defined(&self, name: &str) -> bool {
+    /// Returns true if `#<name>` has a value.
+    pub(super) fn is_defined(&self, name: &str) -> bool {
         self.control_name(name).is_some() || self.parameters.named(name).is_some()
     }
 }

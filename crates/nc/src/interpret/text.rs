@@ -2,6 +2,7 @@
 
 use virtual_axes_core::text::escaped;
 
+use super::dialect::Dialect;
 use super::error::Outcome;
 
 /// Line of a program without comments and blanks.
@@ -13,13 +14,21 @@ pub(super) struct LineText {
     pub text: Vec<u8>,
     /// Message to the operator, from a comment (MSG, …).
     pub message: Option<String>,
+    /// Line number N, if it is an integer.
+    pub number: Option<u32>,
     /// True if the line begins with a slash.
     pub is_optional: bool,
 }
 
 impl LineText {
     /// Computes the other fields from `raw`.
-    pub(super) fn compact(&mut self) -> Outcome<()> {
+    ///
+    /// # Errors
+    ///
+    /// In LinuxCNC a comment without end or within a comment, and in all dialects a character that is no ASCII.
+    pub(super) fn compact(&mut self, dialect: Dialect) -> Outcome<()> {
+        let is_strict = dialect == Dialect::LinuxCnc;
+        self.number = None;
         self.text.clear();
         self.message = None;
         self.is_optional = false;
@@ -27,13 +36,28 @@ impl LineText {
         while let Some((index, byte)) = rest.next() {
             match byte {
                 b' ' | b'\t' => {}
+                // Control characters of serial lines.
+                0..b' ' | 0x7f => {}
                 b';' => break,
                 b'(' => {
-                    let comment = comment(&self.raw[index + 1..])?;
+                    let comment = match is_strict {
+                        true => comment(&self.raw[index + 1..])?,
+                        false => any_comment(&self.raw[index + 1..]),
+                    };
                     self.message = message(comment).or(self.message.take());
                     rest.nth(comment.len());
                 }
-                b'/' if self.text.is_empty() && !self.is_optional => self.is_optional = true,
+                b'/' if self.is_before_words() && !self.is_optional => {
+                    self.is_optional = true;
+                    // Number of the switch, 1 to 9.
+                    if let [b'1'..=b'9', next, ..] = self.raw[index + 1..]
+                        && !next.is_ascii_digit()
+                    {
+                        rest.next();
+                    }
+                }
+                b'\'' if dialect == Dialect::Mach3 => break,
+                b':' if dialect.has_macro_b() && self.text.is_empty() => self.text.push(b'o'),
                 b'!'..=b'~' => self.text.push(byte.to_ascii_lowercase()),
                 _ => {
                     return Err(format!(
@@ -56,8 +80,18 @@ impl LineText {
         if end < 2 {
             return Err("word N: a line number of digits is required".to_owned());
         }
+        self.number = str::from_utf8(&self.text[1..end]).ok().and_then(|digits| digits.parse().ok());
         self.text.drain(..end);
         Ok(())
+    }
+
+    /// Returns true if the text so far is at most a line number.
+    fn is_before_words(&self) -> bool {
+        match self.text.split_first() {
+            None => true,
+            Some((b'n', digits)) => digits.iter().all(u8::is_ascii_digit),
+            Some(_) => false,
+        }
     }
 }
 
@@ -67,6 +101,24 @@ fn comment(rest: &[u8]) -> Outcome<&[u8]> {
         Some(end) if rest[end] == b')' => Ok(&rest[..end]),
         Some(_) => Err("comment within a comment: remove the inner parenthesis".to_owned()),
         None => Err("comment without closing parenthesis".to_owned()),
+    }
+}
+
+/// Returns the text of the comment that begins `rest`, which may contain comments and ends with the line at the latest.
+fn any_comment(rest: &[u8]) -> &[u8] {
+    let mut depth = 0_u32;
+    for (index, byte) in rest.iter().enumerate() {
+        match byte {
+            b'(' => depth += 1,
+            b')' if depth == 0 => return &rest[..index],
+            b')' => depth -= 1,
+            _ => {}
+        }
+    }
+    // Without its end for all inner ones, the first closing parenthesis ends it.
+    match rest.iter().position(|byte| *byte == b')') {
+        Some(end) if depth > 0 => &rest[..end],
+        _ => rest,
     }
 }
 

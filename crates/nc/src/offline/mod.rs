@@ -1,9 +1,10 @@
 //! Part programs simulated without a node: their setpoints, and the lines with the largest errors.
 
+mod extent;
 mod setpoints;
+mod survey;
 mod worst_lines;
 
-pub use setpoints::{
-    OverrideSchedule, PartProgramOptions, PartProgramSource, ProgramTrack, TrackPoint, parse_m_code,
-};
-pub use worst_lines::{Cause, CycleError, LineErrors, ProgramFigures, WorstLine};
+pub use setpoints::{OverrideSchedule, PartProgramOptions, PartProgramSource, ProgramTrack};
+pub use survey::ProgramSurvey;
+pub use worst_lines::{Cause, CycleError, LineErrors, ProgramFigures, WorstLine, line_texts};

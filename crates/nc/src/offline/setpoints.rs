@@ -1,14 +1,19 @@
 //! Setpoints of a part program, with the source line of each.
 
 use std::cell::RefCell;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 
 use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::text::BuiltinFiles;
+use virtual_axes_core::trajectory::PathPlace;
 use virtual_axes_core::trial::{GridSource, SourceError};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
-use crate::builtin::{ProgramReader, open_program};
-use crate::interpret::{IgnoredCode, Interpreter, InterpreterOptions, ProgramError};
+use crate::builtin::{ProgramReader, open_program, program_folder};
+use crate::interpret::{
+    DetectedDialect, Dialect, IgnoredCodes, InterpretationReport, Interpreter, InterpreterOptions,
+    Occurrences, ProgramError, ToolTable, WorkOffset,
+};
 use crate::motion::{Blend, PathControl, ProgramEvent, ProgramStep};
 use crate::plan::{FeedPlanError, PartProgramPlanner, PlanOptions};
 
@@ -71,38 +76,48 @@ impl OverrideSchedule {
 pub struct PartProgramOptions {
     /// Feed override.
     pub schedule: OverrideSchedule,
-    /// M codes without effect.
-    pub ignored_m_codes: Vec<u32>,
+    /// Dialect; `None` detects it.
+    pub dialect: Option<Dialect>,
+    /// Codes without effect.
+    pub ignored: IgnoredCodes,
+    /// Work offsets that are given.
+    pub work_offsets: Vec<WorkOffset>,
+    /// Tool table; empty for tools of the length of the machine.
+    pub tools: ToolTable,
+    /// Duration of a tool change (M6), s.
+    pub tool_change_time: f64,
+    /// Duration of a change of the spindle speed (M3, M4, M5, S), s.
+    pub spindle_time: f64,
     /// Options of the feed planner.
     pub plan: PlanOptions,
 }
 
-/// Reads an M code with or without its letter.
-///
-/// # Errors
-///
-/// Returns an error for other texts.
-pub fn parse_m_code(text: &str) -> Result<u32, String> {
-    let digits = text.strip_prefix(['M', 'm']).unwrap_or(text);
-    digits.parse().map_err(|_| "must be an M code, as 100 or M100".to_owned())
-}
-
-/// Place of a setpoint on the path of a program.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TrackPoint {
-    /// Source line, from 1; 0 at the start of the program.
-    pub line: usize,
-    /// Programmed feed, m/s or rad/s; infinite at rapid traverse.
-    pub programmed_feed: f64,
-    /// Path position from the start of the program, m.
-    pub path_position: f64,
+impl PartProgramOptions {
+    /// Returns the options of the interpreter for a machine.
+    pub fn interpreter(&self, machine: &MachineConfig) -> InterpreterOptions {
+        let mut options = InterpreterOptions::for_machine(machine);
+        options.dialect = self.dialect;
+        options.ignored.clone_from(&self.ignored);
+        options.tools.clone_from(&self.tools);
+        if !self.tools.is_empty() {
+            options.default_tool_length = Some(0.0);
+        }
+        for WorkOffset { index, coordinates } in &self.work_offsets {
+            options.work_offsets[*index] = *coordinates;
+            if let Some(given) = &mut options.given_work_offsets {
+                given.insert(*index);
+            }
+        }
+        (options.tool_change_time, options.spindle_time) = (self.tool_change_time, self.spindle_time);
+        options
+    }
 }
 
 /// Setpoints that are not simulated yet, and the times of the program.
 #[derive(Debug, Clone, Default)]
 pub struct ProgramTrack {
-    /// Setpoints in order.
-    pub setpoints: VecDeque<TrackPoint>,
+    /// Places of the setpoints in order.
+    pub setpoints: VecDeque<PathPlace>,
     /// Time from the first to the last setpoint, s.
     pub cycle_time: f64,
     /// Duration of all motions at their programmed feed, s.
@@ -111,8 +126,10 @@ pub struct ProgramTrack {
     pub dwell_time: f64,
     /// Farthest source line that was read, from 1.
     pub lines_read: usize,
-    /// Ignored M codes of the lines read.
-    pub ignored_codes: BTreeMap<u32, IgnoredCode>,
+    /// Dialect of the program.
+    pub dialect: Option<DetectedDialect>,
+    /// Words without effect and assumptions of the program.
+    pub report: InterpretationReport,
     /// First line with a stop (M0, M1), which the simulation passes without a wait.
     pub stop: Option<usize>,
     /// First line of a motion with a tolerance of merged lines (G64 Q), which has no effect.
@@ -120,16 +137,19 @@ pub struct ProgramTrack {
 }
 
 impl ProgramTrack {
-    /// Returns notes on words without effect: line and text.
+    /// Returns notes on dialect, assumptions and words without effect: line and text.
     pub fn notes(&self) -> Vec<(usize, String)> {
-        let codes = self.ignored_codes.iter().map(|(code, found)| {
-            let IgnoredCode { count, first_line } = found;
-            (*first_line, format!("M{code} is ignored, {count} in all"))
+        let dialect = self.dialect.iter().filter_map(DetectedDialect::note);
+        let codes = self.report.without_effect.iter().map(|(code, found)| {
+            let Occurrences { count, first_line } = found;
+            (*first_line, format!("{code} is ignored, {count} in all"))
         });
+        let assumptions =
+            self.report.assumptions.iter().map(|(text, found)| (found.first_line, text.clone()));
         let stop = self.stop.map(|line| (line, "M0 and M1 stop the axes and do not wait".to_owned()));
         let merging = "G64 Q has no effect: short lines are joined within P".to_owned();
         let merging = self.merge_tolerance.map(|line| (line, merging));
-        let mut notes: Vec<_> = codes.chain(stop).chain(merging).collect();
+        let mut notes: Vec<_> = dialect.chain(codes).chain(assumptions).chain(stop).chain(merging).collect();
         notes.sort_by_key(|(line, _)| *line);
         notes
     }
@@ -148,9 +168,9 @@ impl Iterator for NotedSteps<'_> {
         let step = self.interpreter.next();
         let mut track = self.track.borrow_mut();
         track.lines_read = track.lines_read.max(self.interpreter.line());
-        let codes = self.interpreter.ignored_codes();
-        if !codes.is_empty() {
-            track.ignored_codes.clone_from(codes);
+        if matches!(step, Some(Err(_) | Ok(ProgramStep::Event { event: ProgramEvent::End, .. }))) {
+            track.report.clone_from(self.interpreter.report());
+            track.dialect = Some(self.interpreter.dialect().clone());
         }
         match &step {
             Some(Ok(ProgramStep::Motion(motion))) => {
@@ -170,29 +190,33 @@ impl Iterator for NotedSteps<'_> {
 
 /// Source of the setpoints of a part program.
 pub struct PartProgramSource<'a> {
-    planner: PartProgramPlanner<NotedSteps<'a>>,
+    planner: PartProgramPlanner<'a>,
     name: &'a str,
     schedule: &'a OverrideSchedule,
     track: &'a RefCell<ProgramTrack>,
+    joints: Vec<usize>,
     period: Nanoseconds,
     cycle: i64,
+    /// True if the last setpoint is reached at rapid traverse.
+    is_rapid: bool,
 }
 
 impl<'a> PartProgramSource<'a> {
-    /// Opens the part program `name` for a machine; `track` receives its lines and times.
+    /// Opens the part program `name` of `builtin` or the file `name` for a machine; `track` receives its lines and times.
     ///
     /// # Errors
     ///
     /// Returns an error if the file cannot be opened or the machine has invalid limits.
     pub fn open(
         name: &'a str,
+        builtin: &BuiltinFiles,
         machine: &MachineConfig,
         options: &'a PartProgramOptions,
         track: &'a RefCell<ProgramTrack>,
     ) -> Result<Self, String> {
-        let file = open_program(name).map_err(|error| format!("{name}: {error}"))?;
-        let mut interpreter = InterpreterOptions::for_machine(machine);
-        interpreter.ignored_m_codes.clone_from(&options.ignored_m_codes);
+        let file = open_program(name, builtin).map_err(|error| format!("{name}: {error}"))?;
+        let subprogram_folder = program_folder(name, builtin);
+        let interpreter = InterpreterOptions { subprogram_folder, ..options.interpreter(machine) };
         track.replace(ProgramTrack::default());
         let interpreter = Interpreter::new(file, name, interpreter);
         let planner = PartProgramPlanner::new(NotedSteps { interpreter, track }, machine, options.plan)
@@ -202,8 +226,10 @@ impl<'a> PartProgramSource<'a> {
             name,
             schedule: &options.schedule,
             track,
+            joints: (0..machine.axes().len()).collect(),
             period: machine.periods().position,
             cycle: 0,
+            is_rapid: true,
         })
     }
 }
@@ -220,7 +246,11 @@ impl PartProgramSource<'_> {
 
 impl GridSource for PartProgramSource<'_> {
     fn joints(&self) -> &[usize] {
-        self.planner.joints()
+        &self.joints
+    }
+
+    fn is_rapid(&self) -> bool {
+        self.is_rapid
     }
 
     fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError> {
@@ -242,11 +272,8 @@ impl GridSource for PartProgramSource<'_> {
         }
         let Some(setpoint) = setpoint else { return Ok(false) };
         row.copy_from_slice(setpoint.psec());
-        track.setpoints.push_back(TrackPoint {
-            line: setpoint.line,
-            programmed_feed: setpoint.programmed_feed,
-            path_position: setpoint.path_position,
-        });
+        self.is_rapid = setpoint.place.programmed_feed.is_infinite();
+        track.setpoints.push_back(setpoint.place);
         track.cycle_time = time;
         self.cycle += 1;
         Ok(true)

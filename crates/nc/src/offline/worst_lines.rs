@@ -1,15 +1,18 @@
 //! Lines of a part program with the largest contour errors.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::io::{self, BufRead};
 
 use nalgebra::Vector3;
+use virtual_axes_core::assess::StandingTurn;
 use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_core::kinematics::{Kinematics, ToolPose};
+use virtual_axes_core::text::BuiltinFiles;
+use virtual_axes_core::trajectory::PathPlace;
 use virtual_axes_core::trial::Tick;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
-use super::setpoints::{ProgramTrack, TrackPoint};
+use super::setpoints::ProgramTrack;
 use crate::builtin::open_program;
 
 /// Number of lines reported.
@@ -83,13 +86,23 @@ pub struct ProgramFigures {
     pub cycle_time: f64,
     /// Duration of all motions at their programmed feed, s.
     pub programmed_time: f64,
-    /// Lines with the largest contour errors, the largest first.
+    /// Lines with the largest contour errors of motions at feed, the largest first.
     pub worst_lines: Vec<WorstLine>,
+    /// Lines with the largest contour errors at rapid traverse, the largest first.
+    pub worst_rapids: Vec<WorstLine>,
 }
 
-/// Feed and contour error in a position cycle.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Place, feed and contour error of the tool tip in a position cycle.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CycleError {
+    /// Time, s.
+    pub time: f64,
+    /// Source line of the nearest setpoint, from 1; 0 before the first motion.
+    pub line: usize,
+    /// Simulated tool tip in the workpiece frame, m.
+    pub tip: [f64; 3],
+    /// Nearest point of the path, m.
+    pub reference: [f64; 3],
     /// Path position of the nearest setpoint from the start of the program, m.
     pub path_position: f64,
     /// Programmed feed of the tool tip, m/s; infinite at rapid traverse, NaN where rotary axes move alone.
@@ -104,7 +117,7 @@ pub struct CycleError {
 struct TrackedSetpoint {
     pose: ToolPose,
     joints: Vec<f64>,
-    place: TrackPoint,
+    place: PathPlace,
     /// Programmed feed of the tool tip, m/s; NaN where rotary axes move alone.
     tip_feed: f64,
 }
@@ -118,12 +131,15 @@ pub struct LineErrors {
     /// Position period, s.
     period: f64,
     window: VecDeque<TrackedSetpoint>,
-    /// Simulated tool poses with their times, ns, that wait for later setpoints.
-    poses: VecDeque<(ToolPose, Nanoseconds)>,
+    /// Simulated tool poses with their times, ns, that wait for later setpoints, and the setpoints of the same time,
+    /// delayed by α.
+    poses: VecDeque<(ToolPose, Nanoseconds, ToolPose)>,
+    turn: StandingTurn,
     /// Number of setpoints before the window.
     passed: usize,
-    /// Worst lines with the number of their nearest setpoint until the cause is known.
-    worst: Vec<(WorstLine, Option<usize>)>,
+    /// Worst lines of motions at feed and at rapid traverse, with the number of their nearest setpoint until the cause is
+    /// known.
+    worst: [Vec<(WorstLine, Option<usize>)>; 2],
     /// Simulated tool tip of the position cycle before.
     last_tip: Option<Vector3<f64>>,
     /// Line of the cycle before, and the largest orientation error in the cycles in a row on it, rad.
@@ -142,7 +158,8 @@ impl LineErrors {
             window: VecDeque::new(),
             poses: VecDeque::new(),
             passed: 0,
-            worst: Vec::new(),
+            turn: StandingTurn::default(),
+            worst: Default::default(),
             last_tip: None,
             last_line: (0, 0.0),
         }
@@ -157,7 +174,7 @@ impl LineErrors {
         }
         let samples = || tick.machine.axes().iter().map(|axis| axis.sample());
         let joints: Vec<f64> = samples().map(|sample| sample.psec).collect();
-        let start = TrackPoint { line: 0, programmed_feed: f64::INFINITY, path_position: 0.0 };
+        let start = PathPlace { programmed_feed: f64::INFINITY, ..PathPlace::default() };
         let last = self.window.back();
         let place = track.setpoints.pop_front().or(last.map(|last| last.place)).unwrap_or(start);
         let moves = |linear: bool| {
@@ -174,25 +191,36 @@ impl LineErrors {
         }
         self.explain(AFTER);
         let positions: Vec<f64> = samples().map(|sample| sample.position).collect();
-        self.poses.push_back((self.kinematics.forward(&positions), tick.time));
+        self.turn.push(pose, seconds(tick.time));
+        let delayed: Vec<f64> = samples().map(|sample| sample.delayed_psec).collect();
+        let delayed = self.kinematics.forward(&delayed);
+        self.poses.push_back((self.kinematics.forward(&positions), tick.time, delayed));
         if self.poses.len() > AFTER { self.evaluate() } else { None }
     }
 
     /// Evaluates the first waiting tool pose.
     fn evaluate(&mut self) -> Option<CycleError> {
-        let (actual, time) = self.poses.pop_front()?;
-        let (mut error, mut nearest, mut axis) = (f64::INFINITY, 0, actual.axis);
+        let (actual, time, delayed) = self.poses.pop_front()?;
+        let (mut error, mut nearest, mut axis, mut reference) = (f64::INFINITY, 0, actual.axis, actual.tip);
         for (i, pair) in self.window.iter().zip(self.window.iter().skip(1)).enumerate() {
             let [from, to] = [&pair.0.pose, &pair.1.pose];
             let (distance, along) = distance(&actual.tip, &from.tip, &to.tip);
             if distance < error {
                 (error, nearest, axis) = (distance, i + 1, from.axis + (to.axis - from.axis) * along);
+                reference = from.tip + (to.tip - from.tip) * along;
             }
+        }
+        if self.turn.is_turning(seconds(time)) {
+            axis = delayed.axis;
         }
         let last_tip = self.last_tip.replace(actual.tip);
         error.is_finite().then(|| {
             let TrackedSetpoint { place, tip_feed, .. } = &self.window[nearest];
             let found = CycleError {
+                time: seconds(time),
+                line: place.line,
+                tip: actual.tip.into(),
+                reference: reference.into(),
                 path_position: place.path_position,
                 programmed_feed: *tip_feed,
                 reached_feed: last_tip.map_or(0.0, |last| (actual.tip - last).norm() / self.period),
@@ -207,37 +235,39 @@ impl LineErrors {
     }
 
     fn record(&mut self, error: f64, index: usize, time: Nanoseconds) {
-        let line = self.window[index].place.line;
-        let known = self.worst.iter().position(|(worst, _)| worst.line == line);
+        let PathPlace { line, programmed_feed, .. } = self.window[index].place;
+        let lines = &mut self.worst[usize::from(programmed_feed.is_infinite())];
+        let known = lines.iter().position(|(worst, _)| worst.line == line);
         let mut orientation = self.last_line.1;
-        if let Some((worst, _)) = known.and_then(|known| self.worst.get_mut(known)) {
+        if let Some((worst, _)) = known.and_then(|known| lines.get_mut(known)) {
             worst.orientation = worst.orientation.max(orientation);
             orientation = worst.orientation;
         }
-        let least = self.worst.last().map_or(0.0, |(worst, _)| worst.error);
-        let is_new =
-            known.map_or(self.worst.len() < COUNT || error > least, |i| error > self.worst[i].0.error);
+        let least = lines.last().map_or(0.0, |(worst, _)| worst.error);
+        let is_new = known.map_or(lines.len() < COUNT || error > least, |i| error > lines[i].0.error);
         if !is_new {
             return;
         }
         if let Some(index) = known {
-            self.worst.remove(index);
+            lines.remove(index);
         }
         let (text, time, cause) = (String::new(), seconds(time), Cause::Feed);
         let entry = WorstLine { line, text, error, orientation, time, cause };
-        let place = self.worst.partition_point(|(worst, _)| worst.error >= error);
-        self.worst.insert(place, (entry, Some(self.passed + index)));
-        self.worst.truncate(COUNT);
+        let place = lines.partition_point(|(worst, _)| worst.error >= error);
+        lines.insert(place, (entry, Some(self.passed + index)));
+        lines.truncate(COUNT);
     }
 
     /// Determines the causes of errors with `after` later setpoints.
     fn explain(&mut self, after: usize) {
         let end = self.passed + self.window.len();
-        for i in 0..self.worst.len() {
-            if let Some(number) = self.worst[i].1.take_if(|number| *number + after <= end) {
-                self.worst[i].0.cause = self.cause(number.saturating_sub(self.passed));
+        let mut lines = std::mem::take(&mut self.worst);
+        for (worst, number) in lines.iter_mut().flatten() {
+            if let Some(number) = number.take_if(|number| *number + after <= end) {
+                worst.cause = self.cause(number.saturating_sub(self.passed));
             }
         }
+        self.worst = lines;
     }
 
     fn cause(&self, index: usize) -> Cause {
@@ -275,7 +305,7 @@ impl LineErrors {
     }
 
     /// Evaluates the last position cycles, calls `visit` with each, and returns the figures of the program with the texts of
-    /// the lines from the file `name`; `track` has its times.
+    /// the lines from the program `name` of `builtin` or the file `name`; `track` has its times.
     ///
     /// # Errors
     ///
@@ -283,6 +313,7 @@ impl LineErrors {
     pub fn finish(
         mut self,
         name: &str,
+        builtin: &BuiltinFiles,
         track: &ProgramTrack,
         mut visit: impl FnMut(&CycleError),
     ) -> io::Result<ProgramFigures> {
@@ -290,17 +321,34 @@ impl LineErrors {
             self.evaluate().iter().for_each(&mut visit);
         }
         self.explain(0);
-        let mut worst: Vec<WorstLine> = self.worst.into_iter().map(|(worst, _)| worst).collect();
-        let last = worst.iter().map(|worst| worst.line).max().unwrap_or(0);
-        for (i, text) in open_program(name)?.split(b'\n').take(last).enumerate() {
-            let text = text?;
-            for worst in worst.iter_mut().filter(|worst| worst.line == i + 1) {
-                worst.text = String::from_utf8_lossy(&text).trim().chars().take(TEXT).collect();
-            }
-        }
+        let numbers = self.worst.iter().flatten().map(|(worst, _)| worst.line).collect();
+        let texts = line_texts(name, builtin, &numbers)?;
+        let text = |line: usize| texts.get(&line).cloned().unwrap_or_default();
+        let [worst_lines, worst_rapids] = self.worst.map(|lines| {
+            lines.into_iter().map(|(worst, _)| WorstLine { text: text(worst.line), ..worst }).collect()
+        });
         let ProgramTrack { cycle_time, programmed_time, .. } = *track;
-        Ok(ProgramFigures { cycle_time, programmed_time, worst_lines: worst })
+        Ok(ProgramFigures { cycle_time, programmed_time, worst_lines, worst_rapids })
     }
+}
+
+/// Returns the texts of source lines, shortened, from the program `name` of `builtin` or the file `name`.
+///
+/// # Errors
+///
+/// Returns an error if the file cannot be read.
+pub fn line_texts(
+    name: &str,
+    builtin: &BuiltinFiles,
+    lines: &BTreeSet<usize>,
+) -> io::Result<BTreeMap<usize, String>> {
+    let last = lines.last().copied().unwrap_or(0);
+    let texts = open_program(name, builtin)?.split(b'\n').take(last).enumerate();
+    let shown = |(i, text): (usize, io::Result<Vec<u8>>)| {
+        let text = text.map(|text| String::from_utf8_lossy(&text).trim().chars().take(TEXT).collect());
+        lines.contains(&(i + 1)).then(|| Ok((i + 1, text?)))
+    };
+    texts.filter_map(shown).collect()
 }
 
 /// Returns the distance of a point from the line between two points, and the place of its nearest point from 0 to 1.

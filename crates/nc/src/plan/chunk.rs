@@ -4,14 +4,13 @@ use std::sync::Arc;
 
 use virtual_axes_core::trajectory::{KinematicState, MotionChunk, PathPlace};
 
-use super::error::{FeedPlanError, StepError};
+use super::error::FeedPlanError;
+use super::interval_motion::{IntervalMotion, PathState};
+use super::machine_model::MachineModel;
 use super::piece::Piece;
 use super::pieces::Mark;
 use super::planner::PartProgramPlanner;
-use super::segment::{PathSegment, PathState};
-use super::stations::MachineModel;
 use super::vector::JointVector;
-use crate::motion::ProgramStep;
 
 /// Motion along one interval of the path, from a time in the chunk on.
 #[derive(Debug, Clone)]
@@ -23,7 +22,7 @@ struct ChunkPart {
     piece: Option<Arc<Piece>>,
     /// Start of the interval from the start of the piece.
     from: f64,
-    segment: PathSegment,
+    motion: IntervalMotion,
 }
 
 /// Chunk of the planned motion of a part program, from one position cycle to a later one.
@@ -46,9 +45,9 @@ impl PlannedChunk {
     fn at(&self, time: f64) -> (&ChunkPart, PathState) {
         let index = self.parts.partition_point(|part| part.begin <= time).saturating_sub(1);
         let part = &self.parts[index];
-        let local = (part.offset + (time - part.begin).max(0.0)).min(part.segment.duration);
-        let mut state = part.segment.at(local);
-        if self.is_last && index + 1 == self.parts.len() && local >= part.segment.duration {
+        let local = (part.offset + (time - part.begin).max(0.0)).min(part.motion.duration);
+        let mut state = part.motion.at(local);
+        if self.is_last && index + 1 == self.parts.len() && local >= part.motion.duration {
             let length = part.piece.as_ref().map_or(0.0, |piece| piece.length);
             state = PathState { u: length - part.from, rate: 0.0, acceleration: 0.0 };
         }
@@ -95,11 +94,7 @@ impl MotionChunk for PlannedChunk {
     }
 }
 
-impl<I, E> PartProgramPlanner<I>
-where
-    I: Iterator<Item = Result<ProgramStep, E>>,
-    E: Into<StepError>,
-{
+impl PartProgramPlanner<'_> {
     /// Returns the next chunk of the motion as planned, of at least `cycles` position cycles unless it is the last one, or
     /// `None` after the end of the program. Chunks and [`next_setpoint`](Self::next_setpoint) are not mixed.
     ///
@@ -115,43 +110,23 @@ where
     }
 
     fn chunk(&mut self, cycles: u32) -> Result<Option<PlannedChunk>, FeedPlanError> {
-        if !self.is_started {
-            self.is_started = true;
-            let Some(start) = self.ahead.start()? else {
-                self.is_finished = true;
-                return Ok(None);
-            };
-            self.last.psec = start;
+        if !self.is_started && !self.start()? {
+            return Ok(None);
         }
-        let (mut parts, mut elapsed, mut is_new) = (Vec::new(), 0.0, true);
-        'cycles: for _ in 0..cycles {
-            let mut left = self.period;
-            loop {
-                // At the same times as for single setpoints, so that the plan is the same.
-                self.ahead.renew(self.local + self.reserve)?;
-                let Some(entry) = self.ahead.entries.front() else { break 'cycles };
-                let Some(segment) = entry.segment else { break };
-                if std::mem::take(&mut is_new) {
+        let (mut parts, mut elapsed) = (Vec::<ChunkPart>::new(), 0.0);
+        for _ in 0..cycles {
+            // At the same times as for single setpoints, so that the plan is the same.
+            self.pass(1.0, |entry, offset, time| {
+                if let Some(motion) = entry.motion
+                    && (parts.is_empty() || offset == 0.0)
+                {
                     let piece = entry.piece.clone();
-                    parts.push(ChunkPart {
-                        begin: elapsed,
-                        offset: self.local,
-                        piece,
-                        from: entry.from,
-                        segment,
-                    });
+                    parts.push(ChunkPart { begin: elapsed, offset, piece, from: entry.from, motion });
                 }
-                if self.local + left < segment.duration {
-                    self.local += left;
-                    elapsed += left;
-                    break;
-                }
-                left -= segment.duration - self.local;
-                elapsed += segment.duration - self.local;
-                self.local = 0.0;
-                self.passed += segment.duration;
-                self.ahead.entries.pop_front();
-                is_new = true;
+                elapsed += time;
+            })?;
+            if self.is_finished {
+                break;
             }
         }
         self.ahead.renew(self.local + self.reserve)?;
@@ -162,7 +137,7 @@ where
         let cycles =
             if self.is_finished { (elapsed / self.period).ceil().max(1.0) as i64 } else { i64::from(cycles) };
         let mut chunk = PlannedChunk {
-            model: Arc::clone(&self.model),
+            model: Arc::clone(&self.ahead.model),
             parts,
             marks: Vec::new(),
             start: self.last.psec,
@@ -177,7 +152,7 @@ where
     /// Moves lines and feeds of the path passed to `chunk`; those at its end are also kept.
     fn take_marks(&mut self, chunk: &mut PlannedChunk) {
         let end = chunk.place(chunk.cycles as f64 * self.period).path_position;
-        let marks = self.ahead.marks();
+        let marks = &mut self.ahead.source.marks;
         let passed = marks.partition_point(|mark| mark.end < end);
         chunk.marks = marks.iter().take(passed + 1).copied().collect();
         marks.drain(..passed.min(marks.len().saturating_sub(1)));
@@ -186,8 +161,8 @@ where
     fn check_chunk(&mut self, chunk: &PlannedChunk) -> Result<(), FeedPlanError> {
         for cycle in 0..=chunk.cycles {
             let time = cycle as f64 * self.period;
-            chunk.positions(time, &mut self.last.psec[..self.joints.len()]);
-            self.last.line = chunk.place(time).line;
+            chunk.positions(time, &mut self.last.psec[..self.ahead.model.joints.len()]);
+            self.last.place.line = chunk.place(time).line;
             self.check_travel_limits()?;
         }
         Ok(())

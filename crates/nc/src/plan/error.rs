@@ -14,16 +14,6 @@ pub enum FeedPlanError {
     /// Error of the iterator of program steps.
     #[error(transparent)]
     Step(StepError),
-    /// Limit of an axis that is not a positive number.
-    #[error("{axis}: {quantity} limit {value} must be a positive finite number")]
-    InvalidLimit {
-        /// Name of the axis.
-        axis: String,
-        /// Velocity, acceleration or jerk.
-        quantity: &'static str,
-        /// Value found, m or rad per power of second.
-        value: f64,
-    },
     /// Number of joints beyond the programmable axes.
     #[error("the machine has {found} axes, at most {allowed} are supported")]
     TooManyAxes {
@@ -41,12 +31,6 @@ pub enum FeedPlanError {
         value: f64,
         /// Allowed values.
         allowed: &'static str,
-    },
-    /// Position period that is not positive.
-    #[error("position period {found} ns must be positive")]
-    InvalidPeriod {
-        /// Period found, ns.
-        found: i64,
     },
     /// Motion with a coordinate, feed or arc that is not finite.
     #[error("line {line}: {what} {value} is not a finite number")]

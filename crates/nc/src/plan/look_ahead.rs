@@ -3,16 +3,15 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::error::{FeedPlanError, StepError};
+use super::error::FeedPlanError;
+use super::interval_motion::{IntervalMotion, Law, motions, straight_line};
+use super::machine_model::{MachineModel, Surroundings};
 use super::piece::{Piece, PieceCurve};
-use super::pieces::{Mark, Next, PieceSource};
-use super::planned::segments;
-use super::segment::{Law, PathSegment, straight_line};
+use super::pieces::PieceSource;
+use super::source::Part;
 use super::speed::SpeedSolver;
-use super::stations::{MachineModel, Station};
 use super::vector::JointVector;
 use super::window::{Interval, Stations, Window, WindowStart};
-use crate::motion::ProgramStep;
 
 /// Largest number of intervals ahead.
 const MAX_INTERVALS: usize = 6000;
@@ -29,54 +28,61 @@ const CHECKS: [f64; 8] = [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875];
 const RESERVE: f64 = 0.98;
 /// Largest ratio to a limit there; the rest covers the values in between.
 const ACCEPTED: f64 = 0.9985;
+/// Usable fraction of the limits behind a moving start, where the plan before may be the only one within the limits: the
+/// difference to the usual one covers its tolerance.
+const START_SHARE: f64 = 0.998;
+/// Part of the planned time after which a plan that failed is tried again.
+const RETRY: f64 = 0.8;
 
 /// Interval of the path with its planned motion.
 #[derive(Debug, Clone)]
-pub(super) struct Entry {
-    station: Option<Station>,
+pub(super) struct PlannedInterval {
+    /// Interval for the speed solver; `None` for a motion of closed form.
+    interval: Option<Interval>,
     pub piece: Option<Arc<Piece>>,
     /// Start of the interval from the start of the piece.
     pub from: f64,
-    pub segment: Option<PathSegment>,
+    pub motion: Option<IntervalMotion>,
     /// True if the motion stops at the end of the interval.
     is_stop: bool,
-    /// Factor on the programmed feed.
-    pub feed_factor: f64,
 }
 
 /// Look-ahead window over the pieces of a program.
-pub(super) struct LookAhead<I> {
-    source: PieceSource<I>,
-    pub model: MachineModel,
-    pub entries: VecDeque<Entry>,
+pub(super) struct LookAhead<'a> {
+    pub source: PieceSource<'a>,
+    pub model: Arc<MachineModel>,
+    pub entries: VecDeque<PlannedInterval>,
     solver: SpeedSolver,
     is_finished: bool,
     from_stop: f64,
     last_piece: Option<Arc<Piece>>,
+    /// Piece or standstill behind the last entry, read for the division of that before it.
+    next: Option<Part<Arc<Piece>>>,
+    /// Constant rates of the last piece and of the next one, where they are steady.
+    steady: [Option<f64>; 2],
+    /// Time of a stop from the highest rate in the window, s.
+    stopping_time: f64,
+    /// Planned time above which the window is not planned again, since that failed, s.
+    retry_time: f64,
     /// Factor on the programmed feeds of pieces not yet read.
     pub feed_factor: f64,
-    /// Number of windows planned.
-    pub plans: usize,
 }
 
-impl<I, E> LookAhead<I>
-where
-    I: Iterator<Item = Result<ProgramStep, E>>,
-    E: Into<StepError>,
-{
-    pub fn new(source: PieceSource<I>, model: MachineModel) -> Self {
-        let entries = VecDeque::new();
-        let solver = SpeedSolver::default();
+impl<'a> LookAhead<'a> {
+    pub fn new(source: PieceSource<'a>, model: Arc<MachineModel>) -> Self {
         Self {
             source,
             model,
-            entries,
-            solver,
+            entries: VecDeque::new(),
+            solver: SpeedSolver::default(),
             is_finished: false,
             from_stop: 0.0,
             last_piece: None,
+            next: None,
+            steady: [None; 2],
+            stopping_time: 0.0,
+            retry_time: f64::INFINITY,
             feed_factor: 1.0,
-            plans: 0,
         }
     }
 
@@ -89,127 +95,110 @@ where
         Ok(piece.map(|piece| self.model.joints(piece, 0.0)[0]))
     }
 
-    /// Returns the duration of the motions read at their programmed feed, s.
-    pub fn programmed_time(&self) -> f64 {
-        self.source.programmed_time()
-    }
-
-    /// Returns lines and feeds of the motions read.
-    pub fn marks(&mut self) -> &mut VecDeque<Mark> {
-        self.source.marks()
-    }
-
     /// Plans ahead if less than the renewal time is planned. The motion up to `reserve` seconds after the start of the
     /// first interval remains as it is.
     pub fn renew(&mut self, reserve: f64) -> Result<(), FeedPlanError> {
         loop {
-            let (mut planned, mut count, mut ends_at_stop) = (0.0, 0, false);
+            let stopping = self.stopping_time;
+            let enough = (reserve + RENEWAL * stopping).min(self.retry_time);
+            // The standstill at the end of the window shapes the intervals before it, however long they last.
+            let margin = if self.retry_time.is_finite() { 0 } else { MIN_INTERVALS };
+            let (mut planned, mut count, mut kept, mut ends_at_stop) = (0.0, 0, 0, false);
+            let mut beyond = 0;
             for entry in &self.entries {
-                let Some(segment) = &entry.segment else { break };
-                planned += segment.duration;
+                let Some(motion) = &entry.motion else { break };
+                kept += usize::from(planned < reserve);
+                planned += motion.duration;
                 count += 1;
                 ends_at_stop = entry.is_stop;
-            }
-            let stopping = self.stopping_time();
-            let is_complete = self.is_finished && count == self.entries.len();
-            if is_complete || planned > reserve + RENEWAL * stopping {
-                return Ok(());
-            }
-            if count > 0 && !ends_at_stop {
-                let mut kept = 0;
-                let mut time = 0.0;
-                while kept < count && time < reserve {
-                    time += self.entries[kept].segment.map_or(0.0, |segment| segment.duration);
-                    kept += 1;
-                }
-                let before = self.entries.len();
-                self.extend(count, HORIZON * stopping)?;
-                let is_extended = self.entries.len() > before || self.entries.len() > count;
-                if !is_extended || kept + 2 >= count {
+                beyond += usize::from(planned > enough);
+                if beyond > margin || (beyond > 0 && entry.is_stop) {
                     return Ok(());
                 }
-                if self.plan(kept)? {
-                    continue;
-                }
+            }
+            if self.is_finished && count == self.entries.len() {
                 return Ok(());
             }
             self.extend(count, HORIZON * stopping)?;
             if self.entries.len() == count {
                 return Ok(());
             }
-            if self.entries[count].segment.is_none() && !self.plan(count)? {
+            if count > 0 && !ends_at_stop {
+                if kept + 2 >= count || !self.plan(kept)? {
+                    self.retry_time = RETRY * planned;
+                    return Ok(());
+                }
+                self.retry_time = f64::INFINITY;
+            } else if self.entries[count].motion.is_none() && !self.plan(count)? {
                 return Err(self.no_feed(count));
             }
         }
     }
 
     fn no_feed(&self, index: usize) -> FeedPlanError {
-        let window = self.entries.range(index..).filter_map(|entry| entry.station.as_ref());
-        let shortest = window.min_by(|a, b| a.interval.length.total_cmp(&b.interval.length));
-        let (line, interval) = shortest.map_or((0, 0.0), |s| (s.piece.line, s.interval.length));
+        let length = |entry: &PlannedInterval| entry.interval.as_ref().map(|interval| interval.length);
+        let window = self.entries.range(index..).filter_map(|entry| Some((length(entry)?, entry)));
+        let (interval, line) = window
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map_or((0.0, 0), |(length, entry)| (length, entry.piece.as_ref().map_or(0, |piece| piece.line)));
         FeedPlanError::NoFeed { line, interval }
     }
 
-    /// Returns the time of a stop from the highest rate in the window, s.
-    fn stopping_time(&self) -> f64 {
-        let mut longest = 0.0_f64;
-        for station in self.entries.iter().filter_map(|entry| entry.station.as_ref()).step_by(16) {
-            let [acceleration, jerk] = self.model.tangential(&station.interval.ends[0]);
-            let rate = station.interval.cap;
-            longest =
-                longest.max((rate / acceleration).min(2.0 * (rate / jerk).sqrt()) + acceleration / jerk);
-        }
-        longest
+    /// Returns the time of a stop from the rate of an interval, s.
+    fn interval_stopping_time(&self, interval: &Interval) -> f64 {
+        let [acceleration, jerk] = self.model.tangential(&interval.ends[0]);
+        interval.cap / acceleration + acceleration / jerk
     }
 
     /// Reads pieces until the entries from `from` on last about `time` or end at a stop.
     fn extend(&mut self, from: usize, time: f64) -> Result<(), FeedPlanError> {
+        let result = self.read_pieces(from, time);
+        let intervals = self.entries.iter().filter_map(|entry| entry.interval.as_ref());
+        self.stopping_time =
+            intervals.map(|interval| self.interval_stopping_time(interval)).fold(0.0, f64::max);
+        result
+    }
+
+    fn read_pieces(&mut self, from: usize, time: f64) -> Result<(), FeedPlanError> {
         let mut ahead = 0.0;
-        let rate_time = |entry: &Entry| {
-            entry.station.as_ref().map_or(0.0, |s| s.interval.length / s.interval.cap.max(f64::MIN_POSITIVE))
-        };
+        let rate_time = |interval: &Interval| interval.length / interval.cap.max(f64::MIN_POSITIVE);
         for entry in self.entries.range(from..) {
-            ahead += rate_time(entry);
+            ahead += entry.interval.as_ref().map_or(0.0, rate_time);
             if entry.is_stop {
                 return Ok(());
             }
         }
-        let mut stations = Vec::new();
-        while !self.is_finished && self.entries.len() < MAX_INTERVALS {
-            match self.source.next()? {
-                None => self.is_finished = true,
-                Some(Next::Dwell(0.0)) => {}
-                Some(Next::Dwell(time)) => {
-                    let piece = self.last_piece.clone();
-                    self.push_segments(piece.as_ref(), vec![PathSegment::dwell(time)]);
+        while self.entries.len() < MAX_INTERVALS {
+            match self.next_part()? {
+                None => {
+                    self.is_finished = true;
                     return Ok(());
                 }
-                Some(Next::Piece(mut piece)) => {
-                    piece.scale_feed(self.feed_factor);
-                    let piece = Arc::new(piece);
+                Some(Part::Stop(0.0)) => {}
+                Some(Part::Stop(time)) => {
+                    let piece = self.last_piece.clone();
+                    self.push_motions(piece.as_ref(), vec![IntervalMotion::dwell(time)]);
+                    return Ok(());
+                }
+                Some(Part::Path(piece)) => {
                     self.last_piece = Some(Arc::clone(&piece));
-                    let is_stop = piece.stop.is_some();
-                    if let Some(segments) = self.straight(&piece) {
-                        self.push_segments(Some(&piece), segments);
+                    if let Some(motions) = self.straight(&piece) {
+                        self.push_motions(Some(&piece), motions);
                         return Ok(());
                     }
-                    stations.clear();
-                    self.model.stations(&piece, self.from_stop, &mut stations);
-                    self.from_stop = if is_stop { 0.0 } else { self.from_stop + piece.length };
-                    let count = stations.len();
-                    for (i, station) in stations.drain(..).enumerate() {
-                        let entry = Entry {
-                            piece: Some(Arc::clone(&piece)),
-                            from: station.from,
-                            segment: None,
-                            is_stop: is_stop && i + 1 == count,
-                            feed_factor: self.feed_factor,
-                            station: Some(station),
-                        };
-                        ahead += rate_time(&entry);
-                        self.entries.push_back(entry);
+                    let around = self.surroundings(&piece)?;
+                    let entries = &mut self.entries;
+                    self.model.divide(&piece, &around, |from, interval| {
+                        ahead += rate_time(&interval);
+                        let (interval, piece) = (Some(interval), Some(Arc::clone(&piece)));
+                        let is_stop = false;
+                        entries.push_back(PlannedInterval { interval, piece, from, motion: None, is_stop });
+                    });
+                    if let Some(last) = entries.back_mut() {
+                        last.is_stop = piece.is_stop;
                     }
-                    if is_stop || (ahead > time && self.entries.len() >= from + 4 * MIN_INTERVALS) {
+                    self.from_stop = if piece.is_stop { 0.0 } else { self.from_stop + piece.length };
+                    if piece.is_stop || (ahead > time && self.entries.len() >= from + 4 * MIN_INTERVALS) {
                         return Ok(());
                     }
                 }
@@ -218,13 +207,44 @@ where
         Ok(())
     }
 
+    /// Returns the next piece or standstill.
+    fn next_part(&mut self) -> Result<Option<Part<Arc<Piece>>>, FeedPlanError> {
+        if self.next.is_some() {
+            return Ok(self.next.take());
+        }
+        Ok(self.source.next()?.map(|part| match part {
+            Part::Stop(time) => Part::Stop(time),
+            Part::Path(mut piece) => {
+                piece.scale_feed(self.feed_factor);
+                Part::Path(Arc::new(piece))
+            }
+        }))
+    }
+
+    /// Returns the surroundings of the piece that was read last, and reads the one behind it.
+    fn surroundings(&mut self, piece: &Piece) -> Result<Surroundings, FeedPlanError> {
+        let [before, steady] = match self.from_stop > 0.0 {
+            true => self.steady,
+            false => [None, self.model.steady_rate(piece)],
+        };
+        let mut after = None;
+        if !piece.is_stop {
+            self.next = self.next_part()?;
+            if let Some(Part::Path(next)) = &self.next {
+                after = self.model.steady_rate(next);
+            }
+        }
+        self.steady = [steady, after];
+        Ok(Surroundings { from_stop: self.from_stop, steady: [before, steady, after] })
+    }
+
     /// Returns the closed-form motion if `piece` is a straight line of the joints from standstill to standstill.
-    fn straight(&self, piece: &Piece) -> Option<Vec<PathSegment>> {
-        let PieceCurve::Exact(element) = &piece.curve else { return None };
-        let turns = |index: &usize| element.from[*index] != element.to[*index];
+    fn straight(&self, piece: &Piece) -> Option<Vec<IntervalMotion>> {
+        let PieceCurve::Exact(curve) = &piece.curve else { return None };
+        let turns = |index: &usize| curve.from[*index] != curve.to[*index];
         let is_straight =
-            element.is_line() && (piece.tcp_length.is_none() || !self.model.kinds.rotary.iter().any(turns));
-        if !is_straight || self.from_stop > 0.0 || piece.stop.is_none() {
+            curve.is_line() && (piece.tcp_length.is_none() || !self.model.kinds.rotary.iter().any(turns));
+        if !is_straight || self.from_stop > 0.0 || !piece.is_stop {
             return None;
         }
         let (node, cap) = self.model.node(piece, 0.0);
@@ -232,20 +252,19 @@ where
         Some(straight_line(piece.length, [cap, acceleration, jerk]))
     }
 
-    fn push_segments(&mut self, piece: Option<&Arc<Piece>>, segments: Vec<PathSegment>) {
+    fn push_motions(&mut self, piece: Option<&Arc<Piece>>, motions: Vec<IntervalMotion>) {
         let mut from = 0.0;
-        for segment in segments {
-            if segment.law == Law::Dwell {
+        for motion in motions {
+            if motion.law == Law::Dwell {
                 from = piece.map_or(0.0, |piece| piece.length);
             }
-            let length = segment.length;
-            self.entries.push_back(Entry {
-                station: None,
+            let length = motion.length;
+            self.entries.push_back(PlannedInterval {
+                interval: None,
                 piece: piece.map(Arc::clone),
                 from,
-                segment: Some(segment),
+                motion: Some(motion),
                 is_stop: true,
-                feed_factor: self.feed_factor,
             });
             from += length;
         }
@@ -257,30 +276,40 @@ where
         let end = (first..self.entries.len())
             .find(|&i| self.entries[i].is_stop)
             .map_or(self.entries.len(), |i| i + 1);
-        let start = match self.entries[first].segment {
-            Some(segment) if is_moving => {
-                let (b, slope) = segment.start_state();
+        let start = match self.entries[first].motion {
+            Some(motion) if is_moving => {
+                let (b, slope) = motion.start_state();
                 WindowStart::Moving { b, slope }
             }
             _ => WindowStart::Rest,
         };
         let window = self.entries.range(first..end);
-        let mut intervals: Vec<Interval> =
-            window.filter_map(|entry| entry.station.as_ref()).map(|s| s.interval.clone()).collect();
+        let mut intervals: Vec<Interval> = window.filter_map(|entry| entry.interval.clone()).collect();
         if intervals.len() != end - first || intervals.len() < MIN_INTERVALS {
             return Ok(false);
         }
-        self.plans += 1;
+        if is_moving {
+            let mut time = 0.0;
+            for (interval, entry) in intervals.iter_mut().zip(self.entries.range(first..)) {
+                let Some(motion) = entry.motion else { break };
+                time += motion.duration;
+                if time < self.stopping_time {
+                    interval.share = START_SHARE;
+                }
+                let (b, slope) = motion.start_state();
+                interval.guess = b + 0.5 * slope * interval.length;
+            }
+        }
         let mut last = None;
         for _ in 0..MAX_ROUNDS {
             let Some((stations, is_optimal)) = self.solve(&intervals, start) else { break };
-            let segments = segments(&intervals, start, &stations);
-            let is_within = self.reduce(first, &mut intervals, &segments);
+            let motions = motions(&intervals, start, &stations);
+            let is_within = self.reduce(first, &mut intervals, &motions);
             if is_within && is_optimal {
-                self.accept(first, segments);
+                self.accept(first, motions);
                 return Ok(true);
             }
-            last = Some((stations, segments));
+            last = Some((stations, motions));
             if !is_optimal {
                 break;
             }
@@ -291,17 +320,17 @@ where
         };
         let factor = self.slowdown(first, &intervals, &found);
         stations.iter_mut().for_each(|(b, slope)| (*b, *slope) = (*b * factor, *slope * factor));
-        let segments = segments(&intervals, start, &stations);
-        let is_valid = segments.iter().all(|segment| segment.duration.is_finite() && segment.duration > 0.0);
+        let motions = motions(&intervals, start, &stations);
+        let is_valid = motions.iter().all(|motion| motion.duration.is_finite() && motion.duration > 0.0);
         if is_valid {
-            self.accept(first, segments);
+            self.accept(first, motions);
         }
         Ok(is_valid)
     }
 
-    fn accept(&mut self, first: usize, segments: Vec<PathSegment>) {
-        for (i, segment) in segments.into_iter().enumerate() {
-            self.entries[first + i].segment = Some(segment);
+    fn accept(&mut self, first: usize, motions: Vec<IntervalMotion>) {
+        for (i, motion) in motions.into_iter().enumerate() {
+            self.entries[first + i].motion = Some(motion);
         }
     }
 
@@ -317,14 +346,14 @@ where
     }
 
     /// Returns the factor on u̇² with which the joints keep their limits.
-    fn slowdown(&self, first: usize, intervals: &[Interval], segments: &[PathSegment]) -> f64 {
+    fn slowdown(&self, first: usize, intervals: &[Interval], motions: &[IntervalMotion]) -> f64 {
         let mut factor = 1.0_f64;
-        for (i, segment) in segments.iter().enumerate() {
+        for (i, motion) in motions.iter().enumerate() {
             let entry = &self.entries[first + i];
             let Some(piece) = &entry.piece else { continue };
             for at in CHECKS {
-                let [acceleration, jerk] = self.load(piece, entry.from, segment, at);
-                let rate = segment.at(at * segment.duration).rate / intervals[i].cap;
+                let [acceleration, jerk] = self.load(piece, entry.from, motion, at);
+                let rate = motion.at(at * motion.duration).rate / intervals[i].cap;
                 factor = factor.min(1.0 / acceleration).min(jerk.powf(-2.0 / 3.0)).min(1.0 / (rate * rate));
             }
         }
@@ -332,12 +361,12 @@ where
     }
 
     /// Returns true if the joints keep their limits inside all intervals; otherwise reduces the usable limits there.
-    fn reduce(&self, first: usize, intervals: &mut [Interval], segments: &[PathSegment]) -> bool {
+    fn reduce(&self, first: usize, intervals: &mut [Interval], motions: &[IntervalMotion]) -> bool {
         let mut is_within = true;
-        for (i, segment) in segments.iter().enumerate() {
+        for (i, motion) in motions.iter().enumerate() {
             let entry = &self.entries[first + i];
             let Some(piece) = &entry.piece else { continue };
-            let loads = CHECKS.iter().flat_map(|at| self.load(piece, entry.from, segment, *at));
+            let loads = CHECKS.iter().flat_map(|at| self.load(piece, entry.from, motion, *at));
             let worst = loads.fold(0.0, f64::max);
             if worst > ACCEPTED {
                 is_within = false;
@@ -349,11 +378,11 @@ where
         is_within
     }
 
-    /// Returns the largest ratios of a joint's acceleration and jerk to its limits at the fraction `at` of a segment.
-    fn load(&self, piece: &Piece, from: f64, segment: &PathSegment, at: f64) -> [f64; 2] {
-        let t = at * segment.duration;
-        let state = segment.at(t);
-        let jerk = segment.jerk_at(&state);
+    /// Returns the largest ratios of a joint's acceleration and jerk to its limits at the fraction `at` of a motion.
+    fn load(&self, piece: &Piece, from: f64, motion: &IntervalMotion, at: f64) -> [f64; 2] {
+        let t = at * motion.duration;
+        let state = motion.at(t);
+        let jerk = motion.jerk_at(&state);
         let [_, q1, q2, q3] = self.model.joints(piece, from + state.u);
         let (v, a) = (state.rate, state.acceleration);
         let mut worst = [0.0_f64; 2];

@@ -12,20 +12,20 @@
 //! Limits hold for the continuous motion, so that differences of setpoints at any position period keep them.
 
 mod band;
+mod blended_path;
 mod chunk;
-mod element;
 mod error;
+mod interval_motion;
 mod look_ahead;
+mod machine_model;
+mod motion_curve;
 mod nurbs;
 mod piece;
 mod pieces;
 mod planned;
 mod planner;
-mod run;
-mod segment;
 mod source;
 mod speed;
-mod stations;
 mod vector;
 mod window;
 

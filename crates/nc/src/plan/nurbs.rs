@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use super::element::JointKinds;
 use super::error::FeedPlanError;
-use super::vector::{JointVector, difference, mix};
+use super::vector::{JointKinds, JointVector, difference, mix};
 use crate::motion::Nurbs;
 
 /// Largest distance of the chords of a table from their curve: m, and as a fraction of the blending tolerance.

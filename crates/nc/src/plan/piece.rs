@@ -1,6 +1,6 @@
 //! Smooth pieces of the path that the feed is planned along.
 
-use super::element::{Element, FeedCap};
+use super::motion_curve::{FeedCap, MotionCurve};
 use super::vector::{Jet, JointVector, MAX_JOINTS};
 
 /// Curve of a piece.
@@ -9,7 +9,7 @@ pub(super) enum PieceCurve {
     /// Cubic polynomials: value and derivatives at the start.
     Cubic(Jet),
     /// Exact curve of a motion.
-    Exact(Element),
+    Exact(MotionCurve),
 }
 
 /// Bound on the feed along a part of a piece; places from the start of the piece.
@@ -46,8 +46,10 @@ pub(super) struct Piece {
     pub to_stop: Option<f64>,
     /// Exact coordinates at a stop at the end.
     pub end: Option<JointVector>,
-    /// Duration of a standstill at the end, s; `None` without a stop.
-    pub stop: Option<f64>,
+    /// True if the motion stops at the end.
+    pub is_stop: bool,
+    /// Factor on the programmed feeds.
+    pub feed_factor: f64,
 }
 
 impl Piece {
@@ -59,7 +61,7 @@ impl Piece {
             return end;
         }
         match &self.curve {
-            PieceCurve::Exact(element) => element.point(u),
+            PieceCurve::Exact(curve) => curve.point(u),
             PieceCurve::Cubic([p, d1, d2, d3]) => {
                 std::array::from_fn(|i| p[i] + u * (d1[i] + u * (0.5 * d2[i] + u * d3[i] / 6.0)))
             }
@@ -69,7 +71,7 @@ impl Piece {
     /// Returns the coordinates and their derivatives at `u` from the start of the piece.
     pub fn jet(&self, u: f64) -> Jet {
         match &self.curve {
-            PieceCurve::Exact(element) => element.jet(u),
+            PieceCurve::Exact(curve) => curve.jet(u),
             PieceCurve::Cubic([_, d1, d2, d3]) => {
                 let mut jet = [self.point(u), [0.0; MAX_JOINTS], [0.0; MAX_JOINTS], *d3];
                 for i in 0..MAX_JOINTS {
@@ -83,6 +85,7 @@ impl Piece {
 
     /// Multiplies the programmed feeds by `factor`.
     pub fn scale_feed(&mut self, factor: f64) {
+        self.feed_factor = factor;
         let spans = self.caps.iter_mut().map(|span| &mut span.cap);
         for cap in spans.chain(self.changes.iter_mut().flat_map(|change| &mut change.caps)) {
             match cap {

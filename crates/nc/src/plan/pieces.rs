@@ -2,13 +2,12 @@
 
 use std::collections::VecDeque;
 
-use super::element::Element;
-use super::error::{FeedPlanError, StepError};
+use super::blended_path::BlendedPath;
+use super::error::FeedPlanError;
+use super::motion_curve::{CurveEnd, MotionCurve};
 use super::piece::{CapSpan, Piece, PieceCurve};
-use super::run::Run;
 use super::source::{Part, PartSource};
 use super::vector::difference;
-use crate::motion::ProgramStep;
 
 /// Change of the tangent or of the curvature times 1 mm below which an exact path continues without a stop.
 const SMOOTH: f64 = 1e-9;
@@ -24,42 +23,30 @@ pub(super) struct Mark {
 }
 
 /// Source of the pieces of a program.
-pub(super) struct PieceSource<I> {
-    parts: PartSource<I>,
-    ahead: Option<Part>,
-    run: Option<Run>,
+pub(super) struct PieceSource<'a> {
+    parts: PartSource<'a>,
+    ahead: Option<Part<MotionCurve>>,
+    blended: Option<BlendedPath>,
     /// Path parameter at the end of the curves read.
     end: f64,
     largest: f64,
-    marks: VecDeque<Mark>,
-    programmed_time: f64,
+    /// Lines and feeds of the motions read.
+    pub marks: VecDeque<Mark>,
+    /// Duration of the motions read at their programmed feed, s.
+    pub programmed_time: f64,
 }
 
-impl<I, E> PieceSource<I>
-where
-    I: Iterator<Item = Result<ProgramStep, E>>,
-    E: Into<StepError>,
-{
-    pub fn new(parts: PartSource<I>, largest: f64) -> Self {
+impl<'a> PieceSource<'a> {
+    pub fn new(parts: PartSource<'a>, largest: f64) -> Self {
         Self {
             parts,
             ahead: None,
-            run: None,
+            blended: None,
             end: 0.0,
             largest,
             marks: VecDeque::new(),
             programmed_time: 0.0,
         }
-    }
-
-    /// Returns the duration of the motions read at their programmed feed, s.
-    pub fn programmed_time(&self) -> f64 {
-        self.programmed_time
-    }
-
-    /// Returns lines and feeds of the motions read.
-    pub fn marks(&mut self) -> &mut VecDeque<Mark> {
-        &mut self.marks
     }
 
     /// Reads the first motion.
@@ -70,104 +57,94 @@ where
         Ok(())
     }
 
-    /// Returns the next piece, or a standstill of length 0 with its duration, or `None` at the end of the program.
-    pub fn next(&mut self) -> Result<Option<Next>, FeedPlanError> {
+    /// Returns the next piece or standstill, or `None` at the end of the program.
+    pub fn next(&mut self) -> Result<Option<Part<Piece>>, FeedPlanError> {
         loop {
-            if let Some(piece) = self.next_of_run()? {
-                return Ok(Some(Next::Piece(piece)));
+            if let Some(piece) = self.next_blended()? {
+                return Ok(Some(Part::Path(piece)));
             }
             self.fill()?;
-            match self.ahead.take() {
+            let curve = match self.ahead.take() {
                 None => return Ok(None),
-                Some(Part::Stop(dwell)) => return Ok(Some(Next::Dwell(dwell))),
-                Some(Part::Curve { element, blend: Some(tolerance), .. }) => {
-                    let mut run = Run::new(self.end, self.largest);
-                    self.mark(&element);
-                    run.push(element, Some(tolerance));
-                    self.run = Some(run);
-                }
-                Some(Part::Curve { element, blend: None, is_exact_path }) => {
-                    self.fill()?;
-                    let is_smooth = is_exact_path
-                        && matches!(&self.ahead, Some(Part::Curve { element: next, blend: None, .. })
-                            if is_continued(&element, next));
-                    return Ok(Some(Next::Piece(self.exact(element, is_smooth))));
-                }
+                Some(Part::Stop(dwell)) => return Ok(Some(Part::Stop(dwell))),
+                Some(Part::Path(curve)) => curve,
+            };
+            if is_blended(&curve) {
+                let mut blended = BlendedPath::new(self.end, self.largest);
+                self.mark(&curve);
+                blended.push(curve, self.parts.kinds());
+                self.blended = Some(blended);
+            } else {
+                self.fill()?;
+                let is_smooth = curve.at_end == CurveEnd::ExactPath
+                    && matches!(&self.ahead, Some(Part::Path(next)) if !is_blended(next) && is_continued(&curve, next));
+                return Ok(Some(Part::Path(self.exact(curve, is_smooth))));
             }
         }
     }
 
-    fn exact(&mut self, element: Element, is_smooth: bool) -> Piece {
+    fn exact(&mut self, curve: MotionCurve, is_smooth: bool) -> Piece {
         let start = self.end;
-        self.mark(&element);
+        self.mark(&curve);
         Piece {
-            length: element.length,
+            length: curve.length,
             start,
-            caps: vec![CapSpan { from: 0.0, to: element.length, cap: element.cap }],
+            caps: vec![CapSpan { from: 0.0, to: curve.length, cap: curve.cap }],
             changes: Vec::new(),
-            line: element.line,
+            line: curve.line,
             is_graded: false,
-            tcp_length: element.tcp_length,
+            tcp_length: curve.tcp_length,
             to_stop: (!is_smooth).then_some(0.0),
             end: None,
-            stop: (!is_smooth).then_some(0.0),
-            curve: PieceCurve::Exact(element),
+            is_stop: !is_smooth,
+            feed_factor: 1.0,
+            curve: PieceCurve::Exact(curve),
         }
     }
 
-    fn mark(&mut self, element: &Element) {
-        self.end += element.length;
-        self.programmed_time += element.programmed_time();
-        self.marks.push_back(Mark { end: self.end, line: element.line, feed: element.feed });
+    fn mark(&mut self, curve: &MotionCurve) {
+        self.end += curve.length;
+        self.programmed_time += curve.programmed_time();
+        self.marks.push_back(Mark { end: self.end, line: curve.line, feed: curve.feed });
     }
 
-    fn next_of_run(&mut self) -> Result<Option<Piece>, FeedPlanError> {
-        let Some(mut run) = self.run.take() else { return Ok(None) };
-        while !run.is_ready() {
-            self.extend(&mut run)?;
+    fn next_blended(&mut self) -> Result<Option<Piece>, FeedPlanError> {
+        let Some(mut blended) = self.blended.take() else { return Ok(None) };
+        while !blended.is_ready() {
+            self.extend(&mut blended)?;
         }
-        let piece = run.next(self.parts.kinds());
-        self.run = piece.is_some().then_some(run);
+        let piece = blended.next(self.parts.kinds());
+        self.blended = piece.is_some().then_some(blended);
         Ok(piece)
     }
 
-    /// Appends the next curve to `run`, or closes it.
-    fn extend(&mut self, run: &mut Run) -> Result<(), FeedPlanError> {
+    /// Appends the next curve to `blended`, or closes it.
+    fn extend(&mut self, blended: &mut BlendedPath) -> Result<(), FeedPlanError> {
         self.fill()?;
         match self.ahead.take() {
-            Some(Part::Curve { element, blend, is_exact_path }) => {
-                if run.tcp_length() != element.tcp_length {
-                    run.close(0.0);
-                    self.ahead = Some(Part::Curve { element, blend, is_exact_path });
-                    return Ok(());
-                }
-                self.mark(&element);
-                run.push(element, blend);
-                if blend.is_none() {
-                    run.close(0.0);
+            Some(Part::Path(curve)) if curve.tcp_length == blended.tcp_length() => {
+                self.mark(&curve);
+                let is_last = !is_blended(&curve);
+                blended.push(curve, self.parts.kinds());
+                if is_last {
+                    blended.close();
                 }
             }
-            Some(Part::Stop(dwell)) => {
-                run.close(0.0);
-                self.ahead = Some(Part::Stop(dwell));
+            other => {
+                blended.close();
+                self.ahead = other;
             }
-            None => run.close(0.0),
         }
         Ok(())
     }
 }
 
-/// Next part of the path.
-#[derive(Debug, Clone)]
-#[expect(clippy::large_enum_variant, reason = "nearly all parts are pieces")]
-pub(super) enum Next {
-    Piece(Piece),
-    /// Standstill, s.
-    Dwell(f64),
+fn is_blended(curve: &MotionCurve) -> bool {
+    matches!(curve.at_end, CurveEnd::Blend(_))
 }
 
 /// Returns true if `after` continues `before` with the same tangent and curvature.
-fn is_continued(before: &Element, after: &Element) -> bool {
+fn is_continued(before: &MotionCurve, after: &MotionCurve) -> bool {
     let (end, start) = (before.jet(before.length), after.jet(0.0));
     let largest = |order: usize| {
         difference(&end[order], &start[order]).into_iter().fold(0.0, |largest: f64, x| largest.max(x.abs()))

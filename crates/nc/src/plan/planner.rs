@@ -2,22 +2,20 @@
 
 use std::sync::Arc;
 
-use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::config::{LimitsConfig, MachineConfig};
 use virtual_axes_core::kinematics::{AxisRole, Kinematics};
-use virtual_axes_core::trajectory::JointLimits;
 use virtual_axes_core::trajectory::feed_override::{FeedControl, check_feed_override};
-use virtual_axes_core::trial::{GridSource, SourceError};
-use virtual_axes_core::units::{Nanoseconds, seconds};
+use virtual_axes_core::trajectory::{JointLimits, PathPlace};
+use virtual_axes_core::units::seconds;
 
 use super::error::{FeedPlanError, StepError};
-use super::look_ahead::LookAhead;
+use super::interval_motion::Law;
+use super::look_ahead::{LookAhead, PlannedInterval};
+use super::machine_model::MachineModel;
 use super::pieces::PieceSource;
 use super::planned::{Ahead, ORIGIN};
-use super::segment::Law;
 use super::source::{PartSource, ProgramAxes};
-use super::stations::MachineModel;
 use super::vector::{JointVector, MAX_JOINTS, TipToJoints};
-use super::window::JointBounds;
 use crate::motion::ProgramStep;
 
 /// Options of look-ahead and feed planning.
@@ -51,15 +49,8 @@ impl Default for PlanOptions {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlannedSetpoint {
     pub(super) psec: JointVector,
-    /// Source line of the motion.
-    pub line: usize,
-    /// Programmed feed, m/s or rad/s; infinite at rapid traverse.
-    pub programmed_feed: f64,
-    /// Path position from the start of the program, m: the length of the programmed path of the linear axes, with 0.1 m for
-    /// one radian of the rotary axes in the root of the sum of squares.
-    pub path_position: f64,
-    /// Rate of the path position, m/s.
-    pub path_rate: f64,
+    /// Place on the path. A radian of the rotary axes counts as 0.1 m of the path position, in the root of the sum of squares.
+    pub place: PathPlace,
     joints: usize,
 }
 
@@ -103,99 +94,61 @@ impl PlannedSetpoint {
 /// assert!((planner.path_time() - (0.5 + ramps)).abs() < 1e-9);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct PartProgramPlanner<I> {
-    pub(super) ahead: LookAhead<I>,
+pub struct PartProgramPlanner<'a> {
+    pub(super) ahead: LookAhead<'a>,
     limits: Vec<JointLimits>,
-    pub(super) joints: Vec<usize>,
     pub(super) period: f64,
     pub(super) reserve: f64,
     /// Time in the first interval of the window, s.
     pub(super) local: f64,
     /// Duration of the intervals passed, s.
     pub(super) passed: f64,
-    /// Model of the machine for chunks.
-    pub(super) model: Arc<MachineModel>,
     control: FeedControl,
     pub(super) is_started: bool,
     pub(super) is_finished: bool,
     pub(super) last: PlannedSetpoint,
 }
 
-fn positive(axis: &JointLimits) -> Result<(), FeedPlanError> {
-    let limits = &axis.limits;
-    let values =
-        [("velocity", limits.velocity), ("acceleration", limits.acceleration), ("jerk", limits.jerk)];
-    for (quantity, value) in values {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(FeedPlanError::InvalidLimit { axis: axis.name.clone(), quantity, value });
-        }
-    }
-    Ok(())
-}
-
-impl<I, E> PartProgramPlanner<I>
-where
-    I: Iterator<Item = Result<ProgramStep, E>>,
-    E: Into<StepError>,
-{
+impl<'a> PartProgramPlanner<'a> {
     /// Creates a planner for the steps of a program on a machine.
     ///
     /// # Errors
-    /// Returns [`FeedPlanError`] if a limit of the machine or an option is invalid, or if the first motion is.
-    pub fn new(steps: I, machine: &MachineConfig, options: PlanOptions) -> Result<Self, FeedPlanError> {
+    /// Returns [`FeedPlanError`] if an option is invalid, or if the machine has too many axes.
+    pub fn new<E: Into<StepError>>(
+        steps: impl Iterator<Item = Result<ProgramStep, E>> + 'a,
+        machine: &MachineConfig,
+        options: PlanOptions,
+    ) -> Result<Self, FeedPlanError> {
         let limits: Vec<JointLimits> = machine.axes().iter().map(JointLimits::from_axis).collect();
         if limits.len() > MAX_JOINTS {
             return Err(FeedPlanError::TooManyAxes { found: limits.len(), allowed: MAX_JOINTS });
-        }
-        limits.iter().try_for_each(positive)?;
-        let nanoseconds: Nanoseconds = machine.periods().position;
-        if nanoseconds <= 0 {
-            return Err(FeedPlanError::InvalidPeriod { found: nanoseconds });
         }
         check_options(&options)?;
         let axes = ProgramAxes::new(&limits);
         let kinematics = Kinematics::new(machine);
         let tip = match AxisRole::LINEAR.map(|role| kinematics.role(role)) {
-            [Some(x), Some(y), Some(z)] => Some(TipToJoints::new(
-                *machine.kinematics(),
-                [x, y, z],
-                [kinematics.role(AxisRole::A), kinematics.role(AxisRole::C)],
-            )),
+            [Some(x), Some(y), Some(z)] => Some(TipToJoints::new(*kinematics.rotations(), [x, y, z])),
             _ => None,
         };
-        let joints: Vec<JointBounds> = limits
-            .iter()
-            .map(|joint| JointBounds {
-                velocity: joint.limits.velocity,
-                acceleration: joint.limits.acceleration,
-                jerk: joint.limits.jerk,
-            })
-            .collect();
+        let joints: Vec<LimitsConfig> = limits.iter().map(|joint| joint.limits).collect();
+        let nanoseconds = machine.periods().position;
         let period = seconds(nanoseconds);
         let chord = 8.0 * options.chord_error / (period * period);
         let centripetal = options.centripetal_acceleration.min(chord);
         let slowest = joints.iter().map(|j| j.acceleration / j.jerk).fold(0.0, f64::max);
         let model = MachineModel { joints, kinds: axes.kinds.clone(), tip, centripetal };
+        let steps = Box::new(steps.map(|step| step.map_err(Into::into)));
         let parts = PartSource::new(steps, axes, [options.blend_tolerance, options.rotary_tolerance]);
-        let ahead = LookAhead::new(PieceSource::new(parts, options.knot_distance), model.clone());
-        let joints: Vec<usize> = (0..limits.len()).collect();
-        let last = PlannedSetpoint {
-            psec: ORIGIN,
-            line: 0,
-            programmed_feed: f64::INFINITY,
-            path_position: 0.0,
-            path_rate: 0.0,
-            joints: joints.len(),
-        };
-        let control = FeedControl::new(&limits, nanoseconds, &ORIGIN[..joints.len()], 1.0);
+        let ahead = LookAhead::new(PieceSource::new(parts, options.knot_distance), Arc::new(model));
+        let place = PathPlace { programmed_feed: f64::INFINITY, ..PathPlace::default() };
+        let last = PlannedSetpoint { psec: ORIGIN, place, joints: limits.len() };
+        let control = FeedControl::new(&limits, nanoseconds, &ORIGIN[..limits.len()], 1.0);
         Ok(Self {
             ahead,
-            joints,
             period,
             reserve: 2.0 * slowest + 4.0 * period,
             local: 0.0,
             passed: 0.0,
-            model: Arc::new(model),
             control,
             is_started: false,
             limits,
@@ -213,12 +166,7 @@ where
     /// Returns the duration of the motions read at their programmed feeds, s, without ramps, rapid traverse and dwells; at
     /// the end of the program that of all motions.
     pub fn programmed_time(&self) -> f64 {
-        self.ahead.programmed_time()
-    }
-
-    /// Returns the number of look-ahead windows planned.
-    pub fn window_count(&self) -> usize {
-        self.ahead.plans
+        self.ahead.source.programmed_time
     }
 
     /// Returns the setpoints of the next position cycle, or `None` after the end of the program.
@@ -242,14 +190,9 @@ where
     fn cycle(&mut self, feed_override: f64) -> Result<Option<PlannedSetpoint>, FeedPlanError> {
         self.ahead.feed_factor = feed_override.max(1.0);
         if !self.is_started {
-            match self.ahead.start()? {
-                None => {
-                    self.is_finished = true;
-                    return Ok(None);
-                }
-                Some(start) => self.last.psec = start,
+            if !self.start()? {
+                return Ok(None);
             }
-            self.is_started = true;
             self.control.start_at(feed_override);
             for (joint, &position) in self.last.psec().iter().enumerate() {
                 self.control.exclude(joint, position);
@@ -258,7 +201,12 @@ where
             return Ok(Some(self.last));
         }
         self.ahead.renew(self.local + self.reserve)?;
-        let factor = self.ahead.entries.front().map_or(1.0, |entry| entry.feed_factor);
+        let factor = self
+            .ahead
+            .entries
+            .front()
+            .and_then(|entry| entry.piece.as_ref())
+            .map_or(1.0, |piece| piece.feed_factor);
         let motion = Ahead {
             model: &self.ahead.model,
             entries: &self.ahead.entries,
@@ -266,67 +214,76 @@ where
             period: self.period,
         };
         let rate = self.control.advance(feed_override / factor, &motion);
-        self.pass(rate)?;
+        let ended = self.pass(rate, |_, _, _| ())?;
+        self.set_state(ended, rate);
         self.control.record(self.last.psec());
         self.check_travel_limits()?;
         Ok(Some(self.last))
     }
 
-    /// Advances by one position period at the fraction `rate` of the planned speed.
-    fn pass(&mut self, rate: f64) -> Result<(), FeedPlanError> {
+    /// Reads the start of the program; returns false if it has no motion.
+    pub(super) fn start(&mut self) -> Result<bool, FeedPlanError> {
+        let start = self.ahead.start()?;
+        (self.is_started, self.is_finished) = (true, start.is_none());
+        self.last.psec = start.unwrap_or(ORIGIN);
+        Ok(!self.is_finished)
+    }
+
+    /// Advances by one position period at the fraction `rate` of the planned speed. Returns the last interval of the program
+    /// at its end. `visit` receives each interval, the time from its start, and the time passed in it.
+    pub(super) fn pass(
+        &mut self,
+        rate: f64,
+        mut visit: impl FnMut(&PlannedInterval, f64, f64),
+    ) -> Result<Option<PlannedInterval>, FeedPlanError> {
         // Real time left in the cycle: a standstill takes its time at any rate.
-        let mut left = self.period;
+        let (mut left, mut passed) = (self.period, None);
         loop {
             self.ahead.renew(self.local + self.reserve)?;
             let Some(entry) = self.ahead.entries.front() else {
-                self.local = 0.0;
                 self.is_finished = true;
-                self.last.path_rate = 0.0;
-                return Ok(());
+                return Ok(passed);
             };
-            let Some(segment) = entry.segment else { return Ok(()) };
-            let pace = if segment.law == Law::Dwell { 1.0 } else { rate };
-            if self.local + left * pace < segment.duration {
+            let Some(motion) = entry.motion else { return Ok(None) };
+            let pace = if motion.law == Law::Dwell { 1.0 } else { rate };
+            if self.local + left * pace < motion.duration {
+                visit(entry, self.local, left);
                 self.local += left * pace;
-                self.set_state(self.local, rate);
-                return Ok(());
+                return Ok(None);
             }
-            if self.ahead.entries.len() == 1 {
-                self.set_state(segment.duration, rate);
-            }
+            visit(entry, self.local, motion.duration - self.local);
             if pace > 0.0 {
-                left -= (segment.duration - self.local) / pace;
+                left -= (motion.duration - self.local) / pace;
             }
             self.local = 0.0;
-            self.passed += segment.duration;
-            self.ahead.entries.pop_front();
+            self.passed += motion.duration;
+            passed = self.ahead.entries.pop_front();
         }
     }
 
-    /// Sets the setpoints at `local` seconds after the start of the first interval, at the fraction `pace` of its speed.
-    fn set_state(&mut self, local: f64, pace: f64) {
-        let Some(entry) = self.ahead.entries.front() else { return };
-        let (Some(segment), Some(piece)) = (entry.segment, entry.piece.clone()) else {
-            self.last.path_rate = 0.0;
+    /// Sets the setpoints at the fraction `pace` of the planned speed; after the program, to the end of its last interval.
+    fn set_state(&mut self, ended: Option<PlannedInterval>, pace: f64) {
+        let Some(entry) = ended.as_ref().or(self.ahead.entries.front()) else { return };
+        let (Some(motion), Some(piece)) = (&entry.motion, &entry.piece) else {
+            self.last.place.path_rate = 0.0;
             return;
         };
-        let mut state = segment.at(local);
-        let mut u = (entry.from + state.u).min(piece.length);
-        if local >= segment.duration {
-            state.rate = 0.0;
-            u = piece.length;
-        }
-        self.last.psec = self.ahead.model.joints(&piece, u)[0];
-        self.last.path_position = piece.start + u;
-        self.last.path_rate = pace * state.rate;
-        let position = self.last.path_position;
-        let marks = self.ahead.marks();
+        let state = motion.at(self.local);
+        let (u, rate) = match ended {
+            Some(_) => (piece.length, 0.0),
+            None => ((entry.from + state.u).min(piece.length), pace * state.rate),
+        };
+        self.last.psec = self.ahead.model.joints(piece, u)[0];
+        self.last.place.path_position = piece.start + u;
+        self.last.place.path_rate = rate;
+        let position = self.last.place.path_position;
+        let marks = &mut self.ahead.source.marks;
         while marks.len() > 1 && marks[0].end < position {
             marks.pop_front();
         }
         if let Some(mark) = marks.front() {
-            self.last.line = mark.line;
-            self.last.programmed_feed = mark.feed;
+            self.last.place.line = mark.line;
+            self.last.place.programmed_feed = mark.feed;
         }
     }
 
@@ -334,7 +291,7 @@ where
         for (joint, &position) in self.limits.iter().zip(&self.last.psec) {
             if !joint.is_within_travel(position) {
                 return Err(FeedPlanError::OutsideTravelLimits {
-                    line: self.last.line,
+                    line: self.last.place.line,
                     axis: joint.name.clone(),
                     unit: joint.unit(),
                     position,
@@ -368,20 +325,4 @@ fn check_options(options: &PlanOptions) -> Result<(), FeedPlanError> {
         }
     }
     Ok(())
-}
-
-impl<I, E> GridSource for PartProgramPlanner<I>
-where
-    I: Iterator<Item = Result<ProgramStep, E>>,
-    E: Into<StepError>,
-{
-    fn joints(&self) -> &[usize] {
-        &self.joints
-    }
-
-    fn next(&mut self, row: &mut [f64]) -> Result<bool, SourceError> {
-        let Some(setpoint) = self.next_setpoint(1.0)? else { return Ok(false) };
-        row.copy_from_slice(setpoint.psec());
-        Ok(true)
-    }
 }

@@ -4,11 +4,11 @@ use std::collections::VecDeque;
 
 use virtual_axes_core::trajectory::JointLimits;
 
-use super::element::{Arc, Element, FeedCap, FeedJoints, JointKinds, Shape};
+use super::blended_path::ARC_DEVIATION;
 use super::error::{FeedPlanError, StepError};
+use super::motion_curve::{Arc, BlendTolerance, CurveEnd, FeedCap, FeedJoints, MotionCurve, Shape};
 use super::nurbs::SplineTable;
-use super::run::ARC_DEVIATION;
-use super::vector::{JointVector, MAX_JOINTS};
+use super::vector::{JointKinds, JointVector, MAX_JOINTS, mix};
 use crate::motion::{
     AXIS_COUNT, AXIS_LETTERS, Blend, Coordinates, Feed, MotionKind, Nurbs, PathControl, PlanarArc,
     ProgramEvent, ProgramMotion, ProgramStep,
@@ -18,16 +18,12 @@ use crate::motion::{
 const GAP_TOLERANCE: f64 = 1e-9;
 /// Smallest blending tolerance, m.
 const MIN_TOLERANCE: f64 = 1e-8;
-/// Tolerances of blending at the end of an element: linear axes (m) and rotary axes (rad).
-pub(super) type BlendTolerance = [f64; 2];
 
-/// Next part of a program.
+/// Part of a program: one along the path, or a standstill.
 #[derive(Debug, Clone)]
-#[expect(clippy::large_enum_variant, reason = "nearly all parts are curves")]
-pub(super) enum Part {
-    /// Curve; `None` is a stop at its end, otherwise the tolerances of blending; the flag is true for an exact path.
-    Curve { element: Element, blend: Option<BlendTolerance>, is_exact_path: bool },
-    /// Standstill of a duration, s.
+pub(super) enum Part<T> {
+    Path(T),
+    /// Standstill, s.
     Stop(f64),
 }
 
@@ -63,24 +59,23 @@ impl ProgramAxes {
     }
 }
 
+/// Steps of a program in order.
+pub(super) type ProgramSteps<'a> = Box<dyn Iterator<Item = Result<ProgramStep, StepError>> + 'a>;
+
 /// Source of the curves of a program.
-pub(super) struct PartSource<I> {
-    steps: I,
+pub(super) struct PartSource<'a> {
+    steps: ProgramSteps<'a>,
     axes: ProgramAxes,
     default_tolerance: BlendTolerance,
     end: Option<Coordinates>,
     /// Tool length of the last motion.
     tcp_length: Option<f64>,
-    pending: VecDeque<Part>,
+    pending: VecDeque<Part<MotionCurve>>,
     is_finished: bool,
 }
 
-impl<I, E> PartSource<I>
-where
-    I: Iterator<Item = Result<ProgramStep, E>>,
-    E: Into<StepError>,
-{
-    pub fn new(steps: I, axes: ProgramAxes, default_tolerance: BlendTolerance) -> Self {
+impl<'a> PartSource<'a> {
+    pub fn new(steps: ProgramSteps<'a>, axes: ProgramAxes, default_tolerance: BlendTolerance) -> Self {
         let pending = VecDeque::new();
         Self { steps, axes, default_tolerance, end: None, tcp_length: None, pending, is_finished: false }
     }
@@ -91,7 +86,7 @@ where
     }
 
     /// Returns the next curve or stop, or `None` at the end of the program.
-    pub fn next(&mut self) -> Result<Option<Part>, FeedPlanError> {
+    pub fn next(&mut self) -> Result<Option<Part<MotionCurve>>, FeedPlanError> {
         loop {
             if let Some(part) = self.pending.pop_front() {
                 return Ok(Some(part));
@@ -103,7 +98,7 @@ where
                 None => self.is_finished = true,
                 Some(Err(error)) => {
                     self.is_finished = true;
-                    return Err(FeedPlanError::Step(error.into()));
+                    return Err(FeedPlanError::Step(error));
                 }
                 Some(Ok(ProgramStep::Motion(motion))) => self.add(&motion)?,
                 Some(Ok(ProgramStep::Event { line, event })) => self.add_event(line, &event)?,
@@ -201,7 +196,7 @@ where
 
     /// Appends a curve.
     fn push(&mut self, motion: &ProgramMotion, shape: Shape, from: JointVector, to: JointVector) {
-        let length = Element::measure(&shape, &from, &to, &self.axes.kinds);
+        let length = MotionCurve::measure(&shape, &from, &to, &self.axes.kinds);
         if length <= 0.0 {
             return;
         }
@@ -217,17 +212,17 @@ where
             Feed::Rotary(value) => (FeedCap::Speed { value, joints: self.axes.set([3, 4, 5]) }, value),
             Feed::Duration(time) => (FeedCap::Rate(length / time), length / time),
         };
-        let blend = match motion.path_control {
-            PathControl::Blend(blend) => Some([
+        let at_end = match motion.path_control {
+            PathControl::Blend(blend) => CurveEnd::Blend([
                 blend.tolerance.unwrap_or(self.default_tolerance[0]),
                 blend.rotary_tolerance.unwrap_or(self.default_tolerance[1]),
             ]),
-            _ => None,
+            PathControl::ExactPath => CurveEnd::ExactPath,
+            PathControl::ExactStop => CurveEnd::Stop,
         };
-        let is_exact_path = motion.path_control == PathControl::ExactPath;
-        let element =
-            Element { shape, from, to, length, line: motion.line, feed, cap, tcp_length: motion.tcp_length };
-        self.pending.push_back(Part::Curve { element, blend, is_exact_path });
+        let (line, tcp_length) = (motion.line, motion.tcp_length);
+        let curve = MotionCurve { shape, from, to, length, line, feed, cap, tcp_length, at_end };
+        self.pending.push_back(Part::Path(curve));
     }
 
     /// Appends a NURBS curve. Where the path control allows no deviation, it is followed within [`ARC_DEVIATION`] and ends
@@ -281,7 +276,7 @@ where
         let motion = ProgramMotion { feed, ..motion.clone() };
         let mut before = from;
         for (i, (position, _)) in nurbs.control.iter().enumerate().skip(1) {
-            let mut point = super::vector::mix(&from, &to, i as f64 / last as f64);
+            let mut point = mix(&from, &to, i as f64 / last as f64);
             if i < last {
                 [point[x], point[y]] = *position;
             }

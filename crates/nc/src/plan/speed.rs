@@ -36,8 +36,11 @@ const TO_BOUNDARY: f64 = 0.99;
 pub(super) struct SpeedSolver {
     coefficients: Vec<f64>,
     rows: Vec<ConstraintRow>,
-    slacks: Vec<f64>,
-    multipliers: Vec<f64>,
+    /// Slacks and multipliers of both sides of each constraint.
+    slacks: Vec<[f64; 2]>,
+    multipliers: Vec<[f64; 2]>,
+    /// Steps of slacks and multipliers.
+    changes: Vec<[(f64, f64); 2]>,
     gradient: Vec<f64>,
     system: BandSystem,
 }
@@ -53,31 +56,39 @@ impl SpeedSolver {
         self.linearize(window, &ties);
         if window.start == WindowStart::Rest {
             // Strictly within all bounds: jerk is proportional to b^(3/2).
-            let worst = self.rows.iter().map(|row| row.value + 1.0).fold(0.0, f64::max);
+            let worst = self.rows.iter().map(|row| row.value.abs()).fold(0.0, f64::max);
             let factor = (0.9 / worst).clamp(MIN_GUESS, 1.0);
             self.coefficients.iter_mut().for_each(|c| *c *= factor);
             self.linearize(window, &ties);
         }
         let time: f64 = inner.iter().zip(&self.coefficients[1..]).map(|(i, c)| i.length / c.sqrt()).sum();
         self.slacks.clear();
-        self.slacks.extend(self.rows.iter().map(|row| (-row.value).max(0.05)));
-        let mut barrier = 0.2 * time / self.rows.len() as f64;
+        self.slacks.extend(self.rows.iter().map(|row| {
+            let [upper, lower] = row.excess();
+            [(-upper).max(0.05), (-lower).max(0.05)]
+        }));
+        let sides = 2.0 * self.rows.len() as f64;
+        let mut barrier = 0.2 * time / sides;
         self.multipliers.clear();
-        self.multipliers.extend(self.slacks.iter().map(|slack| barrier / slack));
+        self.multipliers.extend(self.slacks.iter().map(|[upper, lower]| [barrier / upper, barrier / lower]));
+        self.changes.clear();
+        self.changes.resize(self.rows.len(), Default::default());
         for _ in 0..MAX_ITERATIONS {
             self.step(window, n, barrier)?;
             self.linearize(window, &ties);
             let rows = self.rows.iter().zip(&self.slacks).zip(&self.multipliers);
             let (mut gap, mut residual) = (0.0, 0.0_f64);
-            for ((row, slack), multiplier) in rows {
-                gap += slack * multiplier;
-                residual = residual.max(row.value + slack);
+            for ((row, slacks), multipliers) in rows {
+                for (side, excess) in row.excess().into_iter().enumerate() {
+                    gap += slacks[side] * multipliers[side];
+                    residual = residual.max(excess + slacks[side]);
+                }
             }
             let (time, dual) = self.optimality(window);
             if gap <= GAP * time && residual <= RESIDUAL && dual <= DUAL * time {
                 return Some((self.stations(window), true));
             }
-            let average = gap / self.rows.len() as f64;
+            let average = gap / sides;
             if dual <= 0.5 * gap && residual <= 0.1 {
                 barrier = barrier.min(0.15 * average);
             } else if dual <= 2.0 * gap {
@@ -98,9 +109,9 @@ impl SpeedSolver {
             time += weight / c.sqrt();
             gradient[k + 1] = -0.5 * weight * c.powf(-1.5);
         }
-        for (row, multiplier) in self.rows.iter().zip(&self.multipliers) {
+        for (row, [upper, lower]) in self.rows.iter().zip(&self.multipliers) {
             for (i, g) in row.gradient.iter().enumerate() {
-                gradient[row.first + i] += multiplier * g;
+                gradient[row.first + i] += (upper - lower) * g;
             }
         }
         let fixed = if window.start == WindowStart::Rest { 1 } else { 2 };
@@ -151,6 +162,10 @@ impl SpeedSolver {
         for k in (fixed..last).rev() {
             c[k] = c[k].min(grown(c[k + 1], gains[k - 1]));
         }
+        // The motion that was planned before is within the limits.
+        for k in fixed..last {
+            c[k] = c[k].max(inner[k - 1].guess);
+        }
         let ties = window.ties();
         if window.start == WindowStart::Rest {
             c[0] = ties[0] * c[1];
@@ -192,6 +207,10 @@ impl SpeedSolver {
                     (0..2_usize.saturating_sub(k)).for_each(|i| row.gradient[i] = 0.0);
                 }
             }
+            if !is_rest && k == 0 {
+                // Of the fixed coefficients alone: nothing can be done about these.
+                self.rows.retain(|row| row.gradient[2] != 0.0);
+            }
         }
     }
 
@@ -205,14 +224,10 @@ impl SpeedSolver {
             let (slope, curvature) = (-0.5 * weight * c.powf(-1.5), 0.75 * weight * c.powf(-2.5));
             self.system.add(k, &[0.0, 1.0, 0.0], curvature, -slope);
         }
-        for ((row, slack), multiplier) in self.rows.iter().zip(&self.slacks).zip(&self.multipliers) {
-            let weight = multiplier / slack;
-            self.system.add(
-                row.first,
-                &row.gradient,
-                weight,
-                -(barrier / slack + weight * (row.value + slack)),
-            );
+        for ((row, slacks), multipliers) in self.rows.iter().zip(&self.slacks).zip(&self.multipliers) {
+            let (excess, weights) = (row.excess(), [multipliers[0] / slacks[0], multipliers[1] / slacks[1]]);
+            let pull = |side: usize| barrier / slacks[side] + weights[side] * (excess[side] + slacks[side]);
+            self.system.add(row.first, &row.gradient, weights[0] + weights[1], pull(1) - pull(0));
         }
         self.system.fix(0);
         self.system.fix(n - 1);
@@ -226,24 +241,35 @@ impl SpeedSolver {
                 primal = primal.min(-0.7 * c / step);
             }
         }
-        let change = |row: &ConstraintRow, slack: f64, multiplier: f64| {
-            let along = dot(&row.gradient, &steps[row.first..row.first + 3]);
-            let slack_step = -(row.value + slack) - along;
+        // Steps of slack and multiplier of one side, by the step of the excess.
+        let change = |excess: f64, along: f64, slack: f64, multiplier: f64| {
+            let slack_step = -(excess + slack) - along;
             (slack_step, (barrier - multiplier * slack_step) / slack - multiplier)
         };
-        for ((row, &slack), &multiplier) in self.rows.iter().zip(&self.slacks).zip(&self.multipliers) {
-            let (slack_step, multiplier_step) = change(row, slack, multiplier);
-            if slack_step < 0.0 {
-                primal = primal.min(-TO_BOUNDARY * slack / slack_step);
-            }
-            if multiplier_step < 0.0 {
-                dual = dual.min(-TO_BOUNDARY * multiplier / multiplier_step);
+        let rows = self.rows.iter().zip(&mut self.slacks).zip(&mut self.multipliers);
+        for (((row, slacks), multipliers), changes) in rows.zip(&mut self.changes) {
+            let along = dot(&row.gradient, &steps[row.first..row.first + 3]);
+            let excess = row.excess();
+            *changes = [
+                change(excess[0], along, slacks[0], multipliers[0]),
+                change(excess[1], -along, slacks[1], multipliers[1]),
+            ];
+            for side in 0..2 {
+                let (slack_step, multiplier_step) = changes[side];
+                if slack_step < 0.0 {
+                    primal = primal.min(-TO_BOUNDARY * slacks[side] / slack_step);
+                }
+                if multiplier_step < 0.0 {
+                    dual = dual.min(-TO_BOUNDARY * multipliers[side] / multiplier_step);
+                }
             }
         }
-        for ((row, slack), multiplier) in self.rows.iter().zip(&mut self.slacks).zip(&mut self.multipliers) {
-            let (slack_step, multiplier_step) = change(row, *slack, *multiplier);
-            *slack += primal * slack_step;
-            *multiplier += dual * multiplier_step;
+        let rows = self.slacks.iter_mut().zip(&mut self.multipliers).zip(&self.changes);
+        for ((slacks, multipliers), changes) in rows {
+            for side in 0..2 {
+                slacks[side] += primal * changes[side].0;
+                multipliers[side] += dual * changes[side].1;
+            }
         }
         for (c, step) in self.coefficients.iter_mut().zip(steps) {
             *c += primal * step;
@@ -272,18 +298,28 @@ impl SpeedSolver {
 mod tests {
     use super::*;
     use crate::plan::vector::MAX_JOINTS;
-    use crate::plan::window::{Interval, JointBounds};
+    use crate::plan::window::Interval;
+    use virtual_axes_core::config::LimitsConfig;
 
     fn straight(lengths: &[f64], cap: f64) -> Vec<Interval> {
         let mut first = [0.0; MAX_JOINTS];
         first[0] = 1.0;
         let node = [first, [0.0; MAX_JOINTS], [0.0; MAX_JOINTS]];
-        lengths.iter().map(|&length| Interval { length, ends: [node, node], cap, share: 1.0 }).collect()
+        lengths
+            .iter()
+            .map(|&length| Interval { length, ends: [node, node], cap, share: 1.0, guess: 0.0 })
+            .collect()
     }
 
     #[test]
     fn a_straight_line_is_nearly_as_fast_as_the_closed_form() {
-        let bounds = [JointBounds { velocity: 0.5, acceleration: 2.5, jerk: 50.0 }];
+        let bounds = [LimitsConfig {
+            velocity: 0.5,
+            acceleration: 2.5,
+            jerk: 50.0,
+            travel_min: f64::NEG_INFINITY,
+            travel_max: f64::INFINITY,
+        }];
         let mut lengths = Vec::new();
         let (mut h, mut half) = (4e-6_f64, 0.0);
         while half < 0.025 {

@@ -1,6 +1,6 @@
 //! Vectors of machine joints and their derivatives along a path.
 
-use virtual_axes_core::config::KinematicsConfig;
+use virtual_axes_core::kinematics::Rotation;
 
 use crate::motion::AXIS_COUNT;
 
@@ -14,6 +14,23 @@ pub(super) type Jet = [JointVector; 4];
 /// Returns the Euclidean norm of the values at `indices`.
 pub(super) fn norm(vector: &JointVector, indices: &[usize]) -> f64 {
     indices.iter().map(|&i| vector[i] * vector[i]).sum::<f64>().sqrt()
+}
+
+/// Length that counts for one radian of a rotary axis in the path parameter, m.
+const ROTARY_LENGTH: f64 = 0.1;
+
+/// Joints by kind of movement.
+#[derive(Debug, Clone, Default)]
+pub(super) struct JointKinds {
+    pub linear: Vec<usize>,
+    pub rotary: Vec<usize>,
+}
+
+impl JointKinds {
+    /// Returns the length of a step in the metric of the path parameter.
+    pub fn length(&self, step: &JointVector) -> f64 {
+        norm(step, &self.linear).hypot(ROTARY_LENGTH * norm(step, &self.rotary))
+    }
 }
 
 /// Returns `a − b`.
@@ -42,10 +59,6 @@ fn sum(x: &Scalar, y: &Scalar) -> Scalar {
     std::array::from_fn(|i| x[i] + y[i])
 }
 
-fn negative(x: &Scalar) -> Scalar {
-    x.map(|value| -value)
-}
-
 fn sine_cosine(x: &Scalar) -> (Scalar, Scalar) {
     let (s, c) = x[0].sin_cos();
     let [_, d1, d2, d3] = *x;
@@ -54,44 +67,55 @@ fn sine_cosine(x: &Scalar) -> (Scalar, Scalar) {
     (sine, cosine)
 }
 
+/// Rotates a point about the pivot of a rotary axis by an angle.
+fn turn(point: &mut [Scalar; 3], rotation: &Rotation, angle: &Scalar) {
+    let ((sine, cosine), [i, j]) = (sine_cosine(angle), rotation.plane());
+    let offset = |point: &mut [Scalar; 3], factor: f64| {
+        for k in [i, j] {
+            point[k][0] += factor * rotation.pivot()[k];
+        }
+    };
+    offset(point, -1.0);
+    let (u, v) = (point[i], point[j]);
+    point[i] = sum(&product(&cosine, &u), &product(&sine.map(|value| -value), &v));
+    point[j] = sum(&product(&cosine, &v), &product(&sine, &u));
+    offset(point, 1.0);
+}
+
 /// Transformation of the tool tip into joints for tool center point control.
 #[derive(Debug, Clone)]
 pub(super) struct TipToJoints {
-    geometry: KinematicsConfig,
+    rotations: [Rotation; 2],
     /// Joint indices of X, Y, Z.
     linear: [usize; 3],
-    /// Joint indices of A and C.
-    tables: [Option<usize>; 2],
 }
 
 impl TipToJoints {
-    pub fn new(geometry: KinematicsConfig, linear: [usize; 3], tables: [Option<usize>; 2]) -> Self {
-        Self { geometry, linear, tables }
+    pub fn new(rotations: [Rotation; 2], linear: [usize; 3]) -> Self {
+        Self { rotations, linear }
     }
 
     /// Converts the tip, in the machine frame with the tables at 0, into positions of X, Y and Z for a tool of `length`,
     /// with three derivatives.
     pub fn apply(&self, coordinates: &mut Jet, length: f64) {
         let of = |index: usize| -> Scalar { std::array::from_fn(|order| coordinates[order][index]) };
-        let shifted = |mut x: Scalar, by: f64| {
-            x[0] += by;
-            x
-        };
-        let [x, y, z] = self.linear.map(of);
-        let angles = self.tables.map(|index| index.map_or([0.0; 4], of));
-        let [(sin_a, cos_a), (sin_c, cos_c)] = angles.map(|angle| sine_cosine(&angle));
-        let KinematicsConfig { pivot_a, pivot_c, .. } = self.geometry;
-        let (x, y) = (shifted(x, -pivot_c[0]), shifted(y, -pivot_c[1]));
-        let turned_x = shifted(sum(&product(&cos_c, &x), &product(&sin_c, &y)), pivot_c[0]);
-        let turned_y = sum(&product(&cos_c, &y), &negative(&product(&sin_c, &x)));
-        let y = shifted(turned_y, pivot_c[1] - pivot_a[0]);
-        let z = shifted(z, -pivot_a[1]);
-        let tilted_y = shifted(sum(&product(&cos_a, &y), &product(&sin_a, &z)), pivot_a[0]);
-        let tilted_z = sum(&product(&cos_a, &z), &negative(&product(&sin_a, &y)));
-        let tilted_z = shifted(tilted_z, pivot_a[1] + length);
-        for (index, value) in self.linear.into_iter().zip([turned_x, tilted_y, tilted_z]) {
-            for (order, derivative) in value.into_iter().enumerate() {
-                coordinates[order][index] = derivative;
+        let angles = self.rotations.each_ref().map(|rotation| rotation.joint().map_or([0.0; 4], of));
+        let mut tip = self.linear.map(of);
+        let mut tool = [[0.0; 4]; 3];
+        tool[2][0] = -length;
+        for (rotation, angle) in
+            self.rotations.iter().zip(&angles).filter(|(rotation, _)| !rotation.is_head())
+        {
+            turn(&mut tip, rotation, &angle.map(|value| -value));
+        }
+        for (rotation, angle) in
+            self.rotations.iter().zip(&angles).rev().filter(|(rotation, _)| rotation.is_head())
+        {
+            turn(&mut tool, rotation, angle);
+        }
+        for (index, (tip, tool)) in self.linear.into_iter().zip(tip.into_iter().zip(tool)) {
+            for order in 0..tip.len() {
+                coordinates[order][index] = tip[order] - tool[order];
             }
         }
     }
@@ -100,15 +124,22 @@ impl TipToJoints {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use virtual_axes_core::config::Parameters;
+    use virtual_axes_core::config::{MachineConfig, Parameters};
     use virtual_axes_core::kinematics::Kinematics;
 
     #[test]
     fn tip_transform_agrees_with_the_kinematics() {
-        let machine = Parameters::embedded_default().unwrap().machine_config().unwrap();
+        for name in ["mikron_ucp710", "bc_center", "fork_head"] {
+            let machine =
+                Parameters::load(name, virtual_axes_builtin::MACHINES).unwrap().machine_config().unwrap();
+            agrees_with_the_kinematics(&machine);
+        }
+    }
+
+    fn agrees_with_the_kinematics(machine: &MachineConfig) {
         let geometry = *machine.kinematics();
-        let kinematics = Kinematics::new(&machine);
-        let transform = TipToJoints::new(geometry, [0, 1, 2], [Some(3), Some(4)]);
+        let kinematics = Kinematics::new(machine);
+        let transform = TipToJoints::new(*kinematics.rotations(), [0, 1, 2]);
         let at = |u: f64| {
             let mut jet = [[0.0; MAX_JOINTS]; 4];
             let values = [0.05 + 0.3 * u, -0.02 + 0.1 * u * u, 0.1 - 0.2 * u, 0.4 + u, -1.0 + 2.0 * u * u];

@@ -1,14 +1,8 @@
 //! Window of the path for the speed solver: intervals, and the constraints of the joints on the spline's coefficients.
 
-use super::vector::JointVector;
+use virtual_axes_core::config::LimitsConfig;
 
-/// Speed, acceleration and jerk limit of a joint.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct JointBounds {
-    pub velocity: f64,
-    pub acceleration: f64,
-    pub jerk: f64,
-}
+use super::vector::JointVector;
 
 /// First three derivatives of the joints at one end of an interval.
 pub(super) type Node = [JointVector; 3];
@@ -22,6 +16,8 @@ pub(super) struct Interval {
     pub cap: f64,
     /// Usable fraction of the acceleration and jerk limits.
     pub share: f64,
+    /// Coefficient of u̇² in a motion that is known before, or 0.
+    pub guess: f64,
 }
 
 /// State at the start of a window.
@@ -36,12 +32,19 @@ pub(super) enum WindowStart {
 /// Solution over the intervals between the rest intervals: b and b′ at each station.
 pub(super) type Stations = Vec<(f64, f64)>;
 
-/// Constraint g ≤ 0 on three consecutive coefficients.
+/// Constraint |g| ≤ 1 on three consecutive coefficients.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ConstraintRow {
     pub first: usize,
     pub gradient: [f64; 3],
     pub value: f64,
+}
+
+impl ConstraintRow {
+    /// Returns the excess over both sides of the constraint: g − 1 and −g − 1.
+    pub fn excess(&self) -> [f64; 2] {
+        [self.value - 1.0, -self.value - 1.0]
+    }
 }
 
 /// Linear form in three consecutive coefficients.
@@ -56,7 +59,7 @@ pub(super) struct IntervalForms {
 }
 
 fn scaled(form: &Form, by: f64) -> Form {
-    form.map(|x| x * by)
+    [form[0] * by, form[1] * by, form[2] * by]
 }
 
 fn sum(a: &Form, b: &Form) -> Form {
@@ -73,7 +76,7 @@ pub(super) struct Window<'a> {
     pub start: WindowStart,
     /// Lengths of the rest intervals: 0 for a moving start.
     pub rest: [f64; 2],
-    pub joints: &'a [JointBounds],
+    pub joints: &'a [LimitsConfig],
 }
 
 impl Window<'_> {
@@ -124,32 +127,28 @@ impl Window<'_> {
         weight
     }
 
-    /// Returns the largest b at the inner end of a rest interval: jerk 2/9 (b / h^(4/3))^(3/2), with a share for the
-    /// curvature.
+    /// Returns the largest b at the inner end of a rest interval, where b ∝ u^(4/3): acceleration 2/3 b / h, jerk
+    /// 2/9 (b / h^(4/3))^(3/2), with a share for the curvature.
     pub fn rest_bound(&self, end: usize) -> f64 {
         let interval = if end == 0 { &self.intervals[0] } else { &self.intervals[self.intervals.len() - 1] };
-        let h = interval.length;
-        let mut jerk = f64::INFINITY;
+        let (h, share) = (interval.length, interval.share);
+        let (mut acceleration, mut jerk) = (f64::INFINITY, f64::INFINITY);
         for (j, bounds) in self.joints.iter().enumerate() {
-            // j (q′ + 9 q″ u + 9/2 q‴ u²) at distance u from the standstill.
-            let size = interval
-                .ends
-                .iter()
-                .map(|node| node[0][j].abs() + 9.0 * node[1][j].abs() * h + 4.5 * node[2][j].abs() * h * h);
-            jerk = jerk.min(interval.share * bounds.jerk / size.fold(0.0, f64::max));
+            for node in &interval.ends {
+                // a (q′ + 3/2 q″ u) and j (q′ + 9 q″ u + 9/2 q‴ u²) at distance u from the standstill.
+                let [first, second, third] = node.map(|derivative| derivative[j].abs());
+                acceleration = acceleration.min(share * bounds.acceleration / (first + 1.5 * second * h));
+                jerk = jerk.min(share * bounds.jerk / (first + 9.0 * second * h + 4.5 * third * h * h));
+            }
         }
-        (4.5 * jerk).powf(2.0 / 3.0) * h.powf(4.0 / 3.0)
+        (1.5 * acceleration * h).min((4.5 * jerk).powf(2.0 / 3.0) * h.powf(4.0 / 3.0))
     }
 }
 
-/// Adds `form · c ≤ bound`.
+/// Adds `form · c ≤ bound` for a positive form.
 pub(super) fn push_upper(rows: &mut Vec<ConstraintRow>, first: usize, form: &Form, c: &[f64], bound: f64) {
     if bound.is_finite() {
-        rows.push(ConstraintRow {
-            first,
-            gradient: scaled(form, 1.0 / bound),
-            value: dot(form, c) / bound - 1.0,
-        });
+        rows.push(ConstraintRow { first, gradient: scaled(form, 1.0 / bound), value: dot(form, c) / bound });
     }
 }
 
@@ -175,23 +174,18 @@ pub(super) fn push_joint_rows(
     shape: &IntervalForms,
     c: &[f64],
     end: usize,
-    joints: &[JointBounds],
+    joints: &[LimitsConfig],
 ) {
     let (b, slope) = (&shape.b[end], &shape.slope[end]);
     let speed = dot(b, c).max(f64::MIN_POSITIVE).sqrt();
-    let value = |order: usize, j: usize| match end {
-        2 => 0.5 * (interval.ends[0][order][j] + interval.ends[1][order][j]),
-        _ => interval.ends[end][order][j],
-    };
+    let [from, to] = if end == 2 { [0, 1] } else { [end; 2] }.map(|end| &interval.ends[end]);
     for (j, bounds) in joints.iter().enumerate() {
-        let (q1, q2, q3) = (value(0, j), value(1, j), value(2, j));
+        let value = |order: usize| 0.5 * (from[order][j] + to[order][j]);
+        let (q1, q2, q3) = (value(0), value(1), value(2));
         if q1 == 0.0 && q2 == 0.0 && q3 == 0.0 {
             continue;
         }
-        let mut push = |gradient: Form, value: f64| {
-            rows.push(ConstraintRow { first: k, gradient, value: value - 1.0 });
-            rows.push(ConstraintRow { first: k, gradient: gradient.map(|x| -x), value: -value - 1.0 });
-        };
+        let mut push = |gradient: Form, value: f64| rows.push(ConstraintRow { first: k, gradient, value });
         if end == 0 {
             let scale = 1.0 / (interval.share * bounds.acceleration);
             let form = sum(&scaled(slope, 0.5 * q1 * scale), &scaled(b, q2 * scale));

@@ -35,6 +35,10 @@ struct Canon {
     work: [f64; AXES],
     shift: [f64; AXES],
     tool: f64,
+    /// Rotation of the work coordinate system, rad.
+    rotation: f64,
+    /// Pitch of synchronous motion, mm.
+    pitch: Option<f64>,
     plane: Plane,
     /// Number of the feed command and its unit, mm.
     feed: (f64, f64),
@@ -53,6 +57,8 @@ pub fn from_canon(text: &str) -> Vec<Item> {
         work: [0.0; AXES],
         shift: [0.0; AXES],
         tool: 0.0,
+        rotation: 0.0,
+        pitch: None,
         plane: Plane::Xy,
         feed: (0.0, 1.0),
         is_per_revolution: false,
@@ -84,6 +90,20 @@ impl Canon {
             "SET_G5X_OFFSET" => self.work = lengths(1),
             "SET_G92_OFFSET" => self.shift = lengths(0),
             "USE_TOOL_LENGTH_OFFSET" => self.tool = numbers[2] * self.unit,
+            "SET_XY_ROTATION" => self.rotation = numbers[0].to_radians(),
+            "START_SPEED_FEED_SYNC" => self.pitch = Some(numbers[0] * self.unit),
+            "STOP_SPEED_FEED_SYNCH" => self.pitch = None,
+            "RIGID_TAP" => {
+                let (start, direction) = (self.position, self.direction);
+                let mut end = start;
+                end[..3]
+                    .copy_from_slice(&self.machine([numbers[0], numbers[1], numbers[2], 0.0, 0.0, 0.0])[..3]);
+                for (position, direction) in [(end, -direction), (start, direction)] {
+                    self.position = position;
+                    self.push_motion("line", &[], false);
+                    self.spindle(self.speed, direction);
+                }
+            }
             "SELECT_PLANE" => {
                 self.plane = match text {
                     "CANON_PLANE_XZ" => Plane::Zx,
@@ -116,8 +136,14 @@ impl Canon {
                 self.items.push(Item::event(format!("message {}", text.trim_matches(['"', ' '])), &[]))
             }
             "MIST_ON" | "FLOOD_ON" | "MIST_OFF" => self.items.push(Item::event(command, &[])),
-            "COMMENT" | "FLOOD_OFF" | "SET_XY_ROTATION" | "SET_FEED_REFERENCE" | "ON_RESET"
-            | "START_CHANGE" | "SET_SPINDLE_MODE" | "PALLET_SHUTTLE" => {}
+            "COMMENT"
+            | "FLOOD_OFF"
+            | "SET_TOOL_TABLE_ENTRY"
+            | "SET_FEED_REFERENCE"
+            | "ON_RESET"
+            | "START_CHANGE"
+            | "SET_SPINDLE_MODE"
+            | "PALLET_SHUTTLE" => {}
             _ => panic!("unknown command {command}"),
         }
     }
@@ -133,7 +159,10 @@ impl Canon {
     /// Returns machine coordinates of programmed ones.
     fn machine(&self, programmed: [f64; AXES]) -> [f64; AXES] {
         let tool = [0.0, 0.0, self.tool, 0.0, 0.0, 0.0];
-        std::array::from_fn(|axis| programmed[axis] + self.work[axis] + self.shift[axis] + tool[axis])
+        let mut shifted: [f64; AXES] = std::array::from_fn(|axis| programmed[axis] + self.shift[axis]);
+        let ([x, y, ..], (sin, cos)) = (shifted, self.rotation.sin_cos());
+        [shifted[0], shifted[1]] = [x * cos - y * sin, x * sin + y * cos];
+        std::array::from_fn(|axis| shifted[axis] + self.work[axis] + tool[axis])
     }
 
     fn straight(&mut self, kind: &str, programmed: [f64; AXES]) {
@@ -175,7 +204,10 @@ impl Canon {
         if kind != "rapid" {
             let unit = if is_rotary { 1.0 } else { self.feed.1 };
             let revolutions = if self.is_per_revolution { self.speed } else { 1.0 };
-            numbers.push((self.feed.0 * unit * revolutions, PRINTED * unit * revolutions));
+            numbers.push(match self.pitch {
+                Some(pitch) => (pitch * self.speed, PRINTED * self.speed),
+                None => (self.feed.0 * unit * revolutions, PRINTED * unit * revolutions),
+            });
         }
         self.items.push(Item { kind: format!("{kind} {control}"), numbers });
     }

@@ -2,8 +2,8 @@
 
 use std::io::Cursor;
 
-use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions, ProgramError};
-use virtual_axes_nc::motion::{ProgramEvent, ProgramMotion, ProgramStep};
+use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions, ProgramError};
+use virtual_axes_nc::motion::{Coordinates, ProgramEvent, ProgramMotion, ProgramStep};
 
 /// Returns the steps of a program.
 pub fn steps(text: &str, options: InterpreterOptions) -> Result<Vec<ProgramStep>, ProgramError> {
@@ -30,10 +30,16 @@ pub fn events(text: &str, options: InterpreterOptions) -> Vec<(usize, ProgramEve
     steps.into_iter().filter_map(event).collect()
 }
 
-/// Returns the error of an invalid program, by default options.
+/// Returns the error of an invalid program of LinuxCNC.
 pub fn error(text: &str) -> String {
-    match steps(text, InterpreterOptions::default()) {
+    let options = InterpreterOptions { dialect: Some(Dialect::LinuxCnc), ..InterpreterOptions::default() };
+    match steps(text, options) {
         Ok(steps) => panic!("{text:?} gives {} steps", steps.len()),
         Err(error) => error.to_string(),
     }
+}
+
+/// Returns X, Y and Z, mm.
+pub fn millimeters(coordinates: &Coordinates) -> [f64; 3] {
+    [0, 1, 2].map(|axis| coordinates[axis] * 1e3)
 }

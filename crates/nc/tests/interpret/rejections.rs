@@ -2,19 +2,28 @@
 
 use std::io::Cursor;
 
-use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions};
+use virtual_axes_nc::interpret::{IgnoredCodes, Interpreter, InterpreterOptions};
 
 use crate::common::{error, events, motions, steps};
 
 #[test]
 fn invalid_words_are_rejected_with_their_line() {
     for (program, expected) in [
-        ("G0 X1\nG33 Z1", "part.nc:2: G33 is not supported; supported: G0 G1 G2 G3 "),
-        ("G41 D1", "part.nc:1: G41 is not supported; supported: G0 "),
         (
-            "M100",
-            "part.nc:1: M100 is not supported and not in the list of ignored M codes; supported: M0 M1 ",
+            "G0 X1\nG34 Z1",
+            "part.nc:2: G34 is not supported in the dialect linuxcnc: skip it with --ignore G34",
         ),
+        (
+            "G16",
+            "part.nc:1: G16 is not supported in the dialect linuxcnc: known in --dialect fanuc or haas or mach3",
+        ),
+        ("G38.2 Z-1", "part.nc:1: G38.2 is not supported in the dialect linuxcnc: probing needs a workpiece"),
+        ("M200", "part.nc:1: M200 is not supported in the dialect linuxcnc: skip it with --ignore M200"),
+        ("M97", "part.nc:1: M97 is not supported in the dialect linuxcnc: known in --dialect haas"),
+        ("G33 Z1", "part.nc:1: G33 and G33.1 require K above 0, the pitch per revolution"),
+        ("G33 Z1 K1", "part.nc:1: G33 and G33.1 require a turning spindle"),
+        ("G41.1 X1", "part.nc:1: G41.1 and G42.1 require D, the diameter of the tool"),
+        ("M61", "part.nc:1: M61 requires Q, the tool in the spindle"),
         ("G1.05 X1", "part.nc:1: G1.05 is not a G code"),
         ("M-1", "part.nc:1: M-1 is not an M code"),
         ("X1", "part.nc:1: X1: axis word without G0, G1, G2 or G3"),
@@ -47,7 +56,8 @@ fn invalid_words_are_rejected_with_their_line() {
         ("G92", "part.nc:1: G92 requires at least one axis word"),
         ("G0 G92 X1", "part.nc:1: G92 and G0 both use the axis words: program them in two lines"),
         ("G10 L2 P12 X1", "part.nc:1: G10 requires P, the coordinate system 1 to 9, or 0 for the active one"),
-        ("G10 P1", "part.nc:1: G10 requires L2 or L20"),
+        ("G10 P1", "part.nc:1: G10 requires L2 or L20, or L1 or L10 to L13 for tools"),
+        ("G10 L1 Z1", "part.nc:1: G10 of a tool requires P, its number"),
         ("G10 L99 P1 X1", "part.nc:1: G10 requires L2 or L20"),
         ("G10 L20 P1", "part.nc:1: G10 L20 requires at least one axis word"),
         ("O1 if [0]\nO1 elseif [1] X5\nO1 endif", "part.nc:2: O1 elseif: X5: an expression in brackets"),
@@ -120,7 +130,7 @@ fn invalid_canned_cycles_are_rejected() {
         ("G81 X1 Z-1 R1 A5", "word A: G81 moves X, Y and Z only"),
         ("G93 F1 G81 X1 Z-1 R1", "G81 requires G94 or G95"),
         ("G81 X1 Z-1 R1\nG82 X2 P1", "G82 requires R, the plane of retraction"),
-        ("G84 X1 Z-1 R1", "G84 is not supported; supported: "),
+        ("G76 X1 Z-1 R1", "G76 is not supported in the dialect linuxcnc: threading"),
     ] {
         let message = error(&format!("F100 G0 Z5\n{line}"));
         assert!(message.contains(&format!(": {expected}")), "{line}: {message}");
@@ -148,10 +158,10 @@ fn invalid_expressions_are_rejected() {
         ("X EXISTS[1]", "word X: EXISTS: a named parameter in brackets is required"),
         ("X#0", "word X: #0: the number of a parameter is 1 to 5602"),
         ("X#5.5", "word X: #5.5: the number of a parameter is 1 to 5602"),
-        ("X#5599", "word X: #5599 is not supported; supported: #1 to #4999"),
+        ("X#5602", "word X: #5602 is not supported; supported: #1 to #5600"),
         ("X#<depth>", "word X: #<depth> has no value: set it before it is used"),
         ("X#<", "word X: <: a name in angle brackets is required"),
-        ("#5221=1", "#5221: read only; #1 to #4999 can be set"),
+        ("#5420=1", "#5420: read only; program G92, G54 or a tool change"),
         ("#<_x>=1", "#<_x>: a value of the control, which cannot be set"),
         ("#1", "end of the line: a parameter setting requires ="),
     ] {
@@ -178,9 +188,9 @@ fn invalid_flow_is_rejected() {
         ("o1 while", "part.nc:1: O1 while: 0 expressions in brackets, expected 1"),
         ("o1 do [1]", "part.nc:1: O1 do: 1 expressions in brackets, expected 0"),
         ("o99999999999 call", "part.nc:1: O999999999…: the label is too large"),
-        ("M98 P7", "part.nc:1: O7: no such subprogram in this file"),
+        ("M98 P7", "part.nc:1: O7: no such subprogram in this file, and no file with its name beside it"),
         ("M98", "part.nc:1: M98 requires P, the number of the subprogram"),
-        ("M99", "part.nc:1: M99 outside of a subprogram that M98 has called"),
+        ("o1 call\nM2\no1 sub\nM99\no1 endsub", "part.nc:4: M99 within a subprogram of an O-word call"),
         ("M98 P7\nM2\nO7\nG0 X1", "part.nc:4: subprogram O7 without M99"),
     ] {
         let message = error(program);
@@ -227,17 +237,20 @@ fn a_long_line_that_is_skipped_has_its_own_number() {
 }
 
 #[test]
-fn ignored_m_codes_have_no_effect() {
-    let options = InterpreterOptions { ignored_m_codes: vec![100, 6], ..InterpreterOptions::default() };
+fn ignored_codes_have_no_effect() {
+    let patterns = ["M100", "6", "G77-G79"].map(|pattern| pattern.parse().expect("a pattern"));
+    let options =
+        InterpreterOptions { ignored: IgnoredCodes::new(patterns.into()), ..InterpreterOptions::default() };
     assert_eq!(motions("G0 X1 M100\nM100 P5 Q2\nG0 X2", options.clone()).len(), 2);
     assert_eq!(motions("G0 X1\nM100 X7\nM100 P1 G0 X2", options.clone()).len(), 2, "words of the code");
+    assert_eq!(motions("G0 X1\nG78 X7 P2\nG0 X2", options.clone()).len(), 2, "words of a G code");
     assert_eq!(events("T1 M6", options.clone()).len(), 2, "selection and end, no change");
     let program = "G0 X1\nM6\nO1 repeat [3]\nM100 P5 M6\nO1 endrepeat\n";
     let mut interpreter = Interpreter::new(Cursor::new(program), "part.nc", options);
     assert!(interpreter.by_ref().all(|step| step.is_ok()));
-    let codes: Vec<_> =
-        interpreter.ignored_codes().iter().map(|(m, code)| (*m, code.count, code.first_line)).collect();
-    assert_eq!(codes, [(6, 4, 2), (100, 3, 4)]);
+    let codes = &interpreter.report().without_effect;
+    let codes: Vec<_> = codes.iter().map(|(m, code)| (m.as_str(), code.count, code.first_line)).collect();
+    assert_eq!(codes, [("M100", 3, 4), ("M6", 4, 2)]);
 }
 
 #[test]

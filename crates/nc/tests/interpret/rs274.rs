@@ -1,11 +1,10 @@
 //! Comparison with rs274 of LinuxCNC: tools/golden_rs274.py writes its canonical commands.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions, ProgramError};
+use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions, ProgramError, Tool, ToolTable};
 use virtual_axes_nc::motion::ProgramStep;
 
 use crate::canonical::{Item, from_canon, from_steps};
@@ -27,21 +26,24 @@ fn programs() -> Vec<PathBuf> {
     programs
 }
 
-/// Returns the lengths of tools.tbl, which are in inches.
-fn tool_lengths() -> BTreeMap<u32, f64> {
+/// Returns the tools of tools.tbl, which are in inches.
+fn tools() -> ToolTable {
     let text = fs::read_to_string(folder().join("tools.tbl")).expect("the tool table");
-    let mut lengths = BTreeMap::new();
+    let mut tools = ToolTable::default();
     for line in text.lines() {
         let word = |letter: char| line.split(' ').find_map(|word| word.strip_prefix(letter));
-        let number = word('T').expect("T").parse().expect("a number");
-        lengths.insert(number, word('Z').expect("Z").parse::<f64>().expect("a number") * 0.0254);
+        let inches =
+            |letter: char| word(letter).map_or(0.0, |word| word.parse::<f64>().expect("a number") * 0.0254);
+        let tool = Tool { length: inches('Z'), radius: 0.5 * inches('D'), name: None };
+        tools.insert(word('T').expect("T").parse().expect("a number"), tool);
     }
-    lengths
+    tools
 }
 
 fn interpreted(path: &Path) -> Result<Vec<ProgramStep>, ProgramError> {
     let options = InterpreterOptions {
-        tool_lengths: tool_lengths(),
+        dialect: Some(Dialect::LinuxCnc),
+        tools: tools(),
         default_tool_length: None,
         ..InterpreterOptions::default()
     };

@@ -2,10 +2,10 @@
 
 use virtual_axes_core::config::{MachineConfig, Parameters, ValueSource};
 use virtual_axes_core::kinematics::Kinematics;
-use virtual_axes_nc::interpret::InterpreterOptions;
+use virtual_axes_nc::interpret::{InterpreterOptions, Tool};
 use virtual_axes_nc::motion::{Coordinates, Feed, MotionKind};
 
-use crate::common::{error, motions, steps};
+use crate::common::{error, motions};
 
 /// Largest error of a position, m.
 const TOLERANCE: f64 = 1e-12;
@@ -70,7 +70,7 @@ fn another_tool_length_moves_the_tip_along_the_tool() {
     let machine = machine();
     let kinematics = Kinematics::new(&machine);
     let mut options = InterpreterOptions::for_machine(&machine);
-    options.tool_lengths.insert(5, 0.130);
+    options.tools.insert(5, Tool { length: 0.130, ..Tool::default() });
     let motions = motions("G0 A20 C-30\nG43.4 H5\nG0 X1\nG43.4 H2\nG0 X2\n", options);
     let [approach, long, short] = &motions[..] else { panic!("{motions:?}") };
     assert_eq!((long.tcp_length, short.tcp_length), (Some(0.130), Some(0.1)));
@@ -98,15 +98,16 @@ fn without_rotation_tool_length_and_tool_center_point_agree() {
 }
 
 #[test]
-fn axis_positions_require_the_end_of_tool_center_point_control() {
+fn axis_positions_interrupt_tool_center_point_control() {
     let options = InterpreterOptions::for_machine(&machine());
-    for line in ["G53 G0 Z0", "G28 Z0", "G30", "G28.1"] {
-        let text = format!("G43.4 H1\n{line}\n");
-        let error = steps(&text, options.clone()).expect_err(line).to_string();
-        let expected =
-            "part.nc:2: axis positions (G28, G30, G53) with tool center point control: program G49 first";
-        assert_eq!(error, expected);
-        assert!(steps(&format!("G43.4 H1\nG49\n{line}\n"), options.clone()).is_ok());
+    for line in ["G53 G0 Z0", "G28 Z0", "G30"] {
+        let text = format!("G90 G43.4 H1\nG0 X10 Y5 Z40\nA20 C30\n{line}\nG0 X10 Y5 Z40 A20 C30\n");
+        let found = motions(&text, options.clone());
+        let axis_motions: Vec<_> = found.iter().filter(|motion| motion.tcp_length.is_none()).collect();
+        assert!(!axis_motions.is_empty(), "{line}");
+        assert!(axis_motions.iter().all(|motion| motion.end[2] == 0.0), "{line}: {axis_motions:?}");
+        let last = found.last().expect("a motion");
+        assert!(last.tcp_length.is_some(), "{line}");
     }
     assert!(error("G43.4").contains("requires a machine with kinematics"));
 }

@@ -23,7 +23,7 @@ fn sequence(overrides: &[(f64, usize)]) -> impl FnMut(usize) -> f64 + use<> {
 
 fn deviation(program: &Program, outcome: &Outcome) -> f64 {
     let motions: Vec<_> = program.motions().collect();
-    let distances = outcome.setpoints.iter().map(|s| to_program(&motions, s.line, s.psec()));
+    let distances = outcome.setpoints.iter().map(|s| to_program(&motions, s.place.line, s.psec()));
     distances.fold(0.0, f64::max)
 }
 
@@ -39,7 +39,7 @@ proptest! {
         outcome.audit.assert_kept();
         let worst = deviation(&program, &outcome);
         prop_assert!(worst <= tolerance(control) + 1e-12, "deviation {worst}");
-        let positions: Vec<f64> = outcome.setpoints.iter().map(|s| s.path_position).collect();
+        let positions: Vec<f64> = outcome.setpoints.iter().map(|s| s.place.path_position).collect();
         prop_assert!(positions.windows(2).all(|pair| pair[1] >= pair[0]), "no motion backward");
         if let Some(last) = outcome.setpoints.last() {
             prop_assert!(last.psec().iter().zip(&program.at).all(|(a, b)| a == b));
@@ -80,7 +80,7 @@ fn the_feed_follows_the_override() {
     for (feed_override, expected) in [(0.5, 0.025), (1.0, 0.05), (2.0, 0.1)] {
         let outcome = plan_with(&program, PlanOptions::default(), |_| feed_override).unwrap();
         outcome.audit.assert_kept();
-        let fastest = outcome.setpoints.iter().map(|s| s.path_rate).fold(0.0, f64::max);
+        let fastest = outcome.setpoints.iter().map(|s| s.place.path_rate).fold(0.0, f64::max);
         assert!((fastest - expected).abs() < 1e-12, "{feed_override}: {fastest}");
     }
 }

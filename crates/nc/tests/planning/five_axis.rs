@@ -46,7 +46,7 @@ proptest! {
             [0, 1, 2].map(|i| tip[i] + geometry.workpiece[i])
         };
         for setpoint in &outcome.setpoints {
-            let distance = to_program(&motions, setpoint.line, &tip(setpoint.psec()));
+            let distance = to_program(&motions, setpoint.place.line, &tip(setpoint.psec()));
             prop_assert!(distance <= tolerance(control) + 1e-12, "deviation {distance}");
         }
         let last = outcome.setpoints.last().unwrap().psec();

@@ -15,7 +15,7 @@ pub fn machine() -> MachineConfig {
 
 /// Returns the machine with linear motors and position cycles of 1 ms.
 pub fn linear_motor_machine() -> MachineConfig {
-    Parameters::builtin("linear_motor_center").unwrap().machine_config().unwrap()
+    Parameters::load("linear_motor_center", virtual_axes_builtin::MACHINES).unwrap().machine_config().unwrap()
 }
 
 /// Returns the default machine with position cycles of 1 ms.

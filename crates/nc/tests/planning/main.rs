@@ -1,5 +1,6 @@
 //! Look-ahead and feed planning of part programs.
 
+mod corners;
 mod deviation;
 mod feed_override;
 mod five_axis;

@@ -126,7 +126,7 @@ fn mean_feed(program: &Program) -> f64 {
     outcome.audit.assert_kept();
     let ramp = 30;
     let inner = &outcome.setpoints[ramp..outcome.setpoints.len() - ramp];
-    let covered = inner[inner.len() - 1].path_position - inner[0].path_position;
+    let covered = inner[inner.len() - 1].place.path_position - inner[0].place.path_position;
     covered / ((inner.len() - 1) as f64 * 0.006)
 }
 

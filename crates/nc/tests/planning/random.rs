@@ -75,7 +75,7 @@ proptest! {
         let motions: Vec<_> = program.motions().collect();
         let mut worst = 0.0_f64;
         for setpoint in &outcome.setpoints {
-            worst = worst.max(to_program(&motions, setpoint.line, setpoint.psec()));
+            worst = worst.max(to_program(&motions, setpoint.place.line, setpoint.psec()));
         }
         prop_assert!(worst <= tolerance(control) + 1e-12, "deviation {worst}");
         let Some(last) = outcome.setpoints.last() else {

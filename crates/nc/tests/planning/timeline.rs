@@ -25,7 +25,7 @@ const CHUNK: u32 = 25;
 /// Timeline with a part program that is planned when it needs a chunk.
 struct ProgramRun<'a> {
     timeline: Timeline,
-    planner: PartProgramPlanner<Box<dyn Iterator<Item = Step> + 'a>>,
+    planner: PartProgramPlanner<'a>,
     is_planned: bool,
     setpoints: Vec<Vec<f64>>,
     lines: Vec<usize>,

@@ -97,8 +97,9 @@ def identify(
     """Identifies friction, gravity, inertia, feedforward, delays and gain of an axis, as `virtual_axes identify` does.
 
     `recordings` are files (CSV, MCAP, exports of controls) or dictionaries of equally long channels: `time` (s),
-    `position` and `psec` (m or rad), `velocity` (m/s or rad/s of the axis), `current` (A), `velocity_feedforward`
-    (rad/s of the motor), `torque_feedforward` (N·m) and `motor_position` (m or rad at the axis). `machine` (default:
+    `position` and `psec` (m or rad), `velocity` (m/s or rad/s of the axis), `current` (A), `torque` (N·m),
+    `velocity_feedforward` (rad/s of the motor), `torque_feedforward` (N·m) and
+    `motor_position` (m or rad at the axis). `machine` (default:
     the first built-in one) has the initial values.
 
     The options are those of the command: `transmission` are recordings with the encoders of motor and load, to identify

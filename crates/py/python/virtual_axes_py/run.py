@@ -121,7 +121,7 @@ class Run:
     def report(self) -> str:
         """Returns the page of `virtual_axes run --report` as HTML: figures, and plots of path, errors and currents.
 
-        The motion is simulated again. A page is self-contained and has no script.
+        The motion is simulated again. A page is self-contained: it has its script and loads nothing.
         """
         title, description = _title(self.setpoints)
         return self.machine.native.report(self.setpoints, title, description)
@@ -132,8 +132,8 @@ class Run:
             page = self.report()
         except (ValueError, OSError):
             return self._table()
-        style = "width: 100%; height: 40em; border: 0"
-        return f'<iframe srcdoc="{escape(page)}" style="{style}" sandbox=""></iframe>'
+        style = "width: 100%; height: 48em; border: 0"
+        return f'<iframe srcdoc="{escape(page)}" style="{style}" sandbox="allow-scripts"></iframe>'
 
     def _table(self) -> str:
         """Returns the table of the axes as HTML."""

@@ -2,20 +2,18 @@
 
 use std::ops::Range;
 
-use super::super::chart::{Band, Chart, ChartAxis, ChartSeries, Panel, SeriesStyle};
-use super::super::document::Section;
-use super::super::table::{Table, TableColumn};
-use super::super::text::number;
-use super::super::unit::DisplayUnit;
-use super::format::{columns, digits, format_r_squared, optional, with_unit};
-use super::recordings::{bands, over_time, single_recording};
-use super::{IdentificationPage, Step, ValidationRecording};
-use virtual_axes_core::units::{MILLIMETER, seconds};
-use virtual_axes_identify::identify::summary::RecordingSummary;
+use virtual_axes_core::units::MILLIMETER;
+use virtual_axes_identify::identify::summary::{ResidualSummary, ValidationSummary};
 use virtual_axes_identify::identify::{
-    Agreement, Experiment, ExperimentComparison, IdentificationInput, ResidualStatistics, SegmentKind,
-    SimulatedExperiment,
+    Agreement, AxisValidation, Experiment, SegmentKind, SimulatedExperiment,
 };
+use virtual_axes_identify::recording::Signals;
+
+use super::figures;
+use super::page::{IdentificationPage, format_r_squared, with_unit};
+use super::recordings::{bands, over_time, single_recording};
+use super::step::Step;
+use crate::{Band, Chart, ChartAxis, ChartSeries, DisplayUnit, Panel, Section, SeriesStyle};
 
 /// Duration above which one move has a plot of its own, s.
 const LONG: f64 = 12.0;
@@ -30,179 +28,102 @@ const MOVE_MARGIN: f64 = 0.2;
 /// Following error above which it is plotted in the unit of positions, m or rad.
 const LARGE_ERROR: f64 = MILLIMETER;
 
+/// Recording with its deviations from the simulation.
+type Compared<'a> = (&'a Signals, &'a Agreement, &'a ResidualSummary);
+
 pub(super) fn section(page: &IdentificationPage) -> Section {
+    let found = page.found;
     let mut section = page.step("Measured and simulated", Step::Agreement);
-    let pairs: Vec<(&IdentificationInput, &Agreement)> =
-        page.inputs.iter().zip(&page.identification.agreements).collect();
     section.paragraphs.push(
         "Simulation of the identified axis in closed loop with the recorded setpoints (Prévost fig. 6). \
          Deviations are simulated minus measured."
             .to_owned(),
     );
-    fill(page, &mut section, &pairs);
+    let agreements = found.identification.agreements.iter().zip(&found.summary.agreement);
+    let compared: Vec<Compared> = found
+        .recordings
+        .iter()
+        .zip(agreements)
+        .map(|(recorded, (agreement, summary))| (&recorded.signals, agreement, &summary.residuals))
+        .collect();
+    fill(page, &mut section, &compared);
     section
 }
 
 /// Creates the section of a validation recording.
 pub(super) fn validation_section(
     page: &IdentificationPage,
-    check: &ValidationRecording,
-    recording: &RecordingSummary,
+    check: &AxisValidation,
+    summary: &ValidationSummary,
 ) -> Section {
-    let mut section = single_recording(recording, check.findings);
-    section.heading = format!("Validation on {}", check.input.signals.name);
+    let mut section = single_recording(&check.recorded, &summary.recording);
+    section.heading = format!("Validation on {}", summary.recording.name);
     section.paragraphs.push("This recording was not used for the identification.".to_owned());
-    fill(page, &mut section, &[(&check.input, check.agreement)]);
+    fill(page, &mut section, &[(&check.recorded.signals, &check.agreement, &summary.residuals)]);
     section
 }
 
-fn fill(page: &IdentificationPage, section: &mut Section, pairs: &[(&IdentificationInput, &Agreement)]) {
-    for (input, agreement) in pairs {
-        if agreement.experiments.is_empty() {
-            let name = &input.signals.name;
-            section.paragraphs.push(match &agreement.inverse {
-                Some(_) => format!(
-                    "{name} has no PSEC that begins at rest: its current is compared with inverse dynamics. \
-                     At rest, static friction allows any current within ±i0."
-                ),
-                None => format!(
+fn fill(page: &IdentificationPage, section: &mut Section, compared: &[Compared]) {
+    for (signals, agreement, _) in
+        compared.iter().filter(|(_, agreement, _)| agreement.experiments.is_empty())
+    {
+        let name = &signals.name;
+        section.paragraphs.push(match &agreement.inverse {
+            Some(_) => format!(
+                "{name} has no PSEC that begins at rest: its current is compared with inverse dynamics. \
+                 At rest, static friction allows any current within ±i0."
+            ),
+            None => {
+                format!(
                     "{name} has neither PSEC that begins at rest nor a current: no comparison is possible."
-                ),
-            });
-        }
-    }
-    let rows: Vec<Vec<String>> = pairs.iter().flat_map(|(input, a)| rows(page, input, a)).collect();
-    if !rows.is_empty() {
-        section.tables.push(table(page, rows));
-    }
-    let baselines: Vec<Vec<String>> =
-        pairs.iter().filter_map(|(input, a)| baseline_row(page, input, a)).collect();
-    if !baselines.is_empty() {
-        let unit = page.error_unit();
-        section.tables.push(Table {
-            caption: "Position from simple predictions and from the model, RMS".to_owned(),
-            columns: vec![
-                TableColumn::new("recording", ""),
-                TableColumn::new("PSEC", unit.symbol),
-                TableColumn::new("best constant lag", "ms"),
-                TableColumn::new("PSEC delayed by it", unit.symbol),
-                TableColumn::new("identified model", unit.symbol),
-            ],
-            rows: baselines,
+                )
+            }
         });
     }
-    let inverse: Vec<Vec<String>> = pairs.iter().filter_map(|(input, a)| inverse_row(input, a)).collect();
-    if !inverse.is_empty() {
+    let found = &page.found.summary;
+    let residuals: Vec<(String, &ResidualSummary)> =
+        compared.iter().map(|(signals, _, residuals)| (signals.name.clone(), *residuals)).collect();
+    if !residuals.is_empty() {
+        section.tables.push(figures::agreement(found, &residuals));
+    }
+    section.paragraphs.extend(
+        residuals
+            .iter()
+            .filter_map(|(name, residuals)| Some(figures::baseline(found, name, residuals)? + ".")),
+    );
+    if residuals.iter().any(|(_, residuals)| residuals.inverse_dynamics.is_some()) {
         section.paragraphs.push(
             "Inverse dynamics is the current that is required for the recorded motion (Prévost eqs. 1 and \
              3), without a simulation. It does not contain oscillations between two samples or above the \
              cut-off frequency of the filter."
                 .to_owned(),
         );
-        let heads = [("recording", ""), ("largest", "A"), ("RMS", "A"), ("R²", "")];
-        section.tables.push(Table {
-            caption: "Current by inverse dynamics minus measured".to_owned(),
-            columns: columns(heads),
-            rows: inverse,
-        });
     }
-    for (input, agreement) in pairs {
+    for &(signals, agreement, _) in compared {
         let count = agreement.experiments.len();
         for (i, (experiment, simulated)) in agreement.experiments.iter().zip(&agreement.simulated).enumerate()
         {
-            let name = name(input, experiment, i, count);
-            let run = Run { page, input, agreement, experiment, simulated };
+            let name = name(signals, experiment, i, count);
+            let run = Run { page, signals, agreement, experiment, simulated };
             section.charts.extend(run.charts(&name));
         }
         if agreement.experiments.is_empty() {
-            section.charts.extend(inverse_chart(page, input, agreement));
+            section.charts.extend(inverse_chart(page, signals, agreement));
         }
     }
 }
 
 /// Returns the name of a part of a recording, numbered if there are several parts.
-fn name(input: &IdentificationInput, experiment: &Experiment, i: usize, count: usize) -> String {
-    let (name, mode) = (&input.signals.name, experiment.mode.name());
+fn name(signals: &Signals, experiment: &Experiment, i: usize, count: usize) -> String {
+    let (name, mode) = (&signals.name, experiment.mode.name());
     let part = if count > 1 { format!(", part {}", i + 1) } else { String::new() };
     format!("{name}{part}, feedforward {mode}")
-}
-
-fn rows(page: &IdentificationPage, input: &IdentificationInput, agreement: &Agreement) -> Vec<Vec<String>> {
-    let (error, velocity) = (page.error_unit(), page.velocity_unit());
-    let count = agreement.experiments.len();
-    let pairs = agreement.experiments.iter().zip(&agreement.comparisons).enumerate();
-    pairs
-        .map(|(i, (experiment, comparison))| {
-            let ExperimentComparison {
-                constant_velocity,
-                elsewhere,
-                velocity: v,
-                current,
-                current_r_squared,
-            } = comparison;
-            let mut row = vec![name(input, experiment, i, count)];
-            let mut put = |deviation: &Option<ResidualStatistics>, unit: &DisplayUnit| {
-                row.push(optional(deviation.map(|d| d.max), unit, 3));
-                row.push(optional(deviation.map(|d| d.rms), unit, 3));
-            };
-            put(constant_velocity, &error);
-            put(elsewhere, &error);
-            put(v, &velocity);
-            put(current, &DisplayUnit::AMPERE);
-            row.push(current_r_squared.map_or_else(String::new, format_r_squared));
-            row
-        })
-        .collect()
-}
-
-fn table(page: &IdentificationPage, rows: Vec<Vec<String>>) -> Table {
-    let (error, velocity) = (page.error_unit().symbol, page.velocity_unit().symbol);
-    let heads = [
-        ("part", ""),
-        ("position at constant velocity: largest", error),
-        ("RMS", error),
-        ("elsewhere: largest", error),
-        ("RMS", error),
-        ("velocity: largest", velocity),
-        ("RMS", velocity),
-        ("current: largest", "A"),
-        ("RMS", "A"),
-        ("R² of the current", ""),
-    ];
-    Table { caption: "Simulated minus measured".to_owned(), columns: columns(heads), rows }
-}
-
-fn baseline_row(
-    page: &IdentificationPage,
-    input: &IdentificationInput,
-    agreement: &Agreement,
-) -> Option<Vec<String>> {
-    let baseline = agreement.baseline?;
-    let of = |value: f64| digits(value / page.error_unit().size, 4);
-    Some(vec![
-        input.signals.name.clone(),
-        of(baseline.command),
-        number(baseline.lag * 1e3, 2),
-        of(baseline.delayed),
-        of(baseline.model),
-    ])
-}
-
-fn inverse_row(input: &IdentificationInput, agreement: &Agreement) -> Option<Vec<String>> {
-    let inverse = agreement.inverse.as_ref()?;
-    let of = |value: f64| optional(Some(value), &DisplayUnit::AMPERE, 3);
-    Some(vec![
-        input.signals.name.clone(),
-        of(inverse.current.max),
-        of(inverse.current.rms),
-        format_r_squared(inverse.r_squared),
-    ])
 }
 
 /// A part of a recording with its simulation.
 struct Run<'a> {
     page: &'a IdentificationPage<'a>,
-    input: &'a IdentificationInput<'a>,
+    signals: &'a Signals,
     agreement: &'a Agreement,
     experiment: &'a Experiment,
     simulated: &'a SimulatedExperiment,
@@ -265,8 +186,7 @@ impl Run<'_> {
             };
         let deviation = |i: usize| at(&s.position, i) - at(&e.position, i);
         let deviation = vec![series("", SeriesStyle::Line(0), &deviation)];
-        let tsp = seconds(page.periods.position);
-        let following = |position: &[f64], i: usize| e.psec_at(i, tsp) - at(position, i);
+        let following = |position: &[f64], i: usize| e.psec_at(i) - at(position, i);
         let largest = window.clone().map(|i| following(&e.position, i).abs()).fold(0.0, f64::max);
         let unit = if largest > LARGE_ERROR { page.position_unit() } else { page.error_unit() };
         let mut panels = vec![
@@ -281,7 +201,7 @@ impl Run<'_> {
             let (from, to) = (band.from.max(from), band.to.min(to));
             (from < to).then_some(Band { from, to, ..band })
         };
-        let bands = bands(self.input.signals, &self.agreement.segments).into_iter().filter_map(clipped);
+        let bands = bands(self.signals, &self.agreement.segments).into_iter().filter_map(clipped);
         let peak = largest_of(&panels);
         Chart {
             note: format!(
@@ -301,12 +221,8 @@ fn largest_of(panels: &[Panel]) -> f64 {
 }
 
 /// Creates the plot of measured current and current by inverse dynamics.
-fn inverse_chart(
-    page: &IdentificationPage,
-    input: &IdentificationInput,
-    agreement: &Agreement,
-) -> Option<Chart> {
-    let (signals, inverse) = (input.signals, agreement.inverse.as_ref()?);
+fn inverse_chart(page: &IdentificationPage, signals: &Signals, agreement: &Agreement) -> Option<Chart> {
+    let inverse = agreement.inverse.as_ref()?;
     let mut modeled = Vec::new();
     let mut deviation = Vec::new();
     for (number, currents) in &inverse.modeled {

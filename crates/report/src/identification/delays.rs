@@ -1,13 +1,12 @@
 //! Section of the delays α, β and γ: deviation between simulation and recording over each delay.
 
-use super::super::chart::{Band, Chart, ChartAxis, ChartSeries, Guide, Panel, SeriesStyle};
-use super::super::document::Section;
-use super::super::table::Table;
-use super::super::unit::DisplayUnit;
-use super::format::{columns, digits, exact};
-use super::{IdentificationPage, Step};
-use virtual_axes_core::units::{Nanoseconds, seconds};
+use virtual_axes_core::units::{MILLISECOND, Nanoseconds, Rounded, seconds};
 use virtual_axes_identify::identify::{DelayFit, DelayParameter};
+
+use super::page::IdentificationPage;
+use super::step::Step;
+use crate::text::digits;
+use crate::{Band, Chart, ChartAxis, ChartSeries, DisplayUnit, Guide, Panel, Section, SeriesStyle, Table};
 
 /// Ratio of the range of all tried delays to the accepted interval above which the interval has an enlarged
 /// plot.
@@ -16,14 +15,23 @@ const WIDE: f64 = 10.0;
 const ENLARGED_MARGIN: f64 = 2.0;
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
-    let fits = &page.identification.delays;
+    let fits = &page.found.identification.delays;
     let mut section = page.step("Delays", Step::Delays);
     if fits.iter().any(|fit| fit.is_joint) {
+        let has_feedforward = fits.iter().any(|fit| fit.delay != DelayParameter::Alpha);
         section.paragraphs.push(
-            "α, β and γ are fitted jointly with gains and torque feedforward, by least squares of simulated minus recorded \
-             positions on the closed loop with its feedforward. The interval of α is a position cycle, in which all delays \
-             give the same motion; those of β and γ are two standard errors wide on each side."
-                .to_owned(),
+            match has_feedforward {
+                true => {
+                    "The delays are fitted jointly with gains and torque feedforward, by least squares of simulated minus recorded \
+                     positions on the closed loop with its feedforward. The interval of α is a position cycle, in which all \
+                     delays give the same motion; those of β and γ are two standard errors wide on each side."
+                }
+                false => {
+                    "α is fitted jointly with the gains, by least squares of simulated minus recorded positions on the closed loop \
+                     without feedforward. Its interval is a position cycle, in which all delays give the same motion."
+                }
+            }
+            .to_owned(),
         );
         section.tables.push(table(page, fits));
         return section;
@@ -36,16 +44,16 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     if fits.is_empty() {
         section
             .paragraphs
-            .push("No delay was identified; the values of the machine file are kept.".to_owned());
+            .push("No delay was identified; the values of the initial machine are kept.".to_owned());
         return section;
     }
     section.paragraphs.push(format!(
         "A delay is effective in steps of a loop cycle: α in position cycles of {} ms; β and γ in velocity \
          cycles of {} ms. All delays of an interval, open below and closed above, give the same motion and \
-         cannot be distinguished by the recordings. A delay of the machine file that lies in its interval is \
+         cannot be distinguished by the recordings. A delay of the initial machine that lies in its interval is \
          kept.",
-        ms(page.periods.position),
-        ms(page.periods.velocity)
+        ms(page.periods().position),
+        ms(page.periods().velocity)
     ));
     section.tables.push(table(page, fits));
     for fit in fits {
@@ -58,7 +66,7 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
 }
 
 fn ms(delay: Nanoseconds) -> String {
-    exact(seconds(delay) * 1e3)
+    Rounded(seconds(delay) / MILLISECOND).to_string()
 }
 
 fn letter(delay: DelayParameter) -> &'static str {
@@ -107,7 +115,7 @@ fn chart(page: &IdentificationPage, fit: &DelayFit, near: bool) -> Chart {
 }
 
 fn table(page: &IdentificationPage, fits: &[DelayFit]) -> Table {
-    let before = &page.identification.initial.delays;
+    let before = &page.found.identification.initial.delays;
     let row = |fit: &DelayFit| {
         let old = match fit.delay {
             DelayParameter::Alpha => before.alpha,
@@ -131,7 +139,7 @@ fn table(page: &IdentificationPage, fits: &[DelayFit]) -> Table {
             .to_owned(),
         ]
     };
-    let heads = [
+    let columns = [
         ("delay", ""),
         ("feedforward", ""),
         ("above", "ms"),
@@ -141,9 +149,5 @@ fn table(page: &IdentificationPage, fits: &[DelayFit]) -> Table {
         ("least RMS", page.error_unit().symbol),
         ("choice", ""),
     ];
-    Table {
-        caption: "Accepted intervals".to_owned(),
-        columns: columns(heads),
-        rows: fits.iter().map(row).collect(),
-    }
+    Table { rows: fits.iter().map(row).collect(), ..Table::new("Accepted intervals", &columns) }
 }

@@ -1,12 +1,13 @@
 //! Section of the feedforward weights VFFW and TFFW: recorded feedforward over the derivatives of PSEC.
 
-use super::super::chart::{Chart, ChartAxis, ChartSeries, Panel, SeriesStyle};
-use super::super::document::Section;
-use super::super::scale::Extent;
-use super::super::unit::DisplayUnit;
-use super::format::{digits, exact, format_r_squared};
-use super::{IdentificationPage, Step};
+use virtual_axes_core::units::Rounded;
 use virtual_axes_identify::identify::FeedforwardRegression;
+
+use super::figures;
+use super::page::{IdentificationPage, format_r_squared};
+use super::step::Step;
+use crate::extent::Extent;
+use crate::{Chart, ChartAxis, ChartSeries, DisplayUnit, Panel, Section, SeriesStyle};
 
 /// Velocity or torque feedforward weight.
 struct Weight<'a> {
@@ -25,7 +26,7 @@ struct Weight<'a> {
 }
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
-    let (found, weights) = (&page.identification.feedforward, page.axis().feedforward);
+    let (found, weights) = (&page.found.identification.feedforward, page.axis().feedforward);
     let mut section = page.step("Feedforward", Step::Feedforward);
     let (speed, acceleration, torque) = if page.has_linear_motor() {
         ("m/s", "m/s²", DisplayUnit::new("N", 1.0, 1e-3))
@@ -68,36 +69,24 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
 impl Weight<'_> {
     fn text(&self, page: &IdentificationPage) -> String {
         let Weight { name, equation, unit, value, .. } = self;
-        let of = |value: f64| format!("{} {unit}", exact(value)).trim_end().to_owned();
-        let Some(found) = self.found else {
-            if *equation == 7 && page.identification.feedforward.is_torque_zero {
-                return "TFFW = 0: TFFWS is 0 throughout with torque feedforward on.".to_owned();
+        let identification = &page.found.identification;
+        if let Some(found) = self.found {
+            let unit = if unit.is_empty() { String::new() } else { format!(", in {unit}") };
+            return format!("{} (eq. {equation}){unit}.", figures::regression(name, found));
+        }
+        if *equation == 7 && identification.feedforward.is_torque_zero {
+            return "TFFW = 0: TFFWS is 0 throughout with torque feedforward on.".to_owned();
+        }
+        let own = format!("feedforward.{}", if *equation == 6 { "velocity" } else { "torque" });
+        let refined = identification.refinement.iter().flat_map(|refinement| &refinement.parameters);
+        let value = format!("{} {unit}", Rounded(*value));
+        let value = value.trim_end();
+        match refined.into_iter().any(|refined| refined.parameter.to_string() == own) {
+            true => format!("{name}: no recording has {name}S. The refinement in closed loop gives {value}."),
+            false => {
+                format!("{name} was not identified: no recording has {name}S other than 0. It stays {value}.")
             }
-            let refined = page.identification.refinement.as_ref().is_some_and(|refinement| {
-                let own = format!("feedforward.{}", if *equation == 6 { "velocity" } else { "torque" });
-                refinement.parameters.iter().any(|refined| refined.parameter.to_string() == own)
-            });
-            return if refined {
-                format!(
-                    "{name}: no recording has {name}S. The refinement in closed loop gives {}.",
-                    of(*value)
-                )
-            } else {
-                format!(
-                    "{name} was not identified: no recording has {name}S other than 0. It stays {}.",
-                    of(*value)
-                )
-            };
-        };
-        let (low, high) = found.delay;
-        format!(
-            "{name} = {} ± {} (eq. {equation}), R² {}; {name}S lags the derivative by {} … {} ms.",
-            digits(found.value, 5),
-            format!("{} {unit}", digits(found.error, 2)).trim_end(),
-            format_r_squared(found.r_squared),
-            exact(low * 1e3),
-            exact(high * 1e3)
-        )
+        }
     }
 
     fn chart(&self, found: &FeedforwardRegression) -> Chart {

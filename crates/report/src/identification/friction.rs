@@ -1,14 +1,15 @@
 //! Section of friction: friction law and measured friction currents (Prévost fig. 5).
 
-use super::super::chart::{Chart, ChartAxis, ChartSeries, Guide, Panel, SeriesStyle};
-use super::super::document::Section;
-use super::super::table::Table;
-use super::super::unit::DisplayUnit;
-use super::format::{columns, digits, format_r_squared, percent, plain};
-use super::{IdentificationPage, Step};
 use virtual_axes_core::config::FrictionConfig;
 use virtual_axes_core::drive;
-use virtual_axes_identify::identify::{FrictionFit, FrictionLaw, LawFit, SteadyCurrent};
+use virtual_axes_identify::identify::{FrictionFit, FrictionLaw, RefinedParameter, SteadyCurrent};
+
+use super::figures;
+use super::friction_points::friction_points;
+use super::page::{IdentificationPage, format_r_squared};
+use super::step::Step;
+use crate::text::{capital, digits};
+use crate::{Chart, ChartAxis, ChartSeries, DisplayUnit, Guide, Panel, Section, SeriesStyle};
 
 /// Number of points of the line of the law in each direction.
 const LINE_POINTS: usize = 200;
@@ -18,58 +19,51 @@ const SPACING_EXPONENT: i32 = 3;
 const VISIBLE: f64 = 1e-3;
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
-    let found = page.identification;
+    let (found, summary) = (&page.found.identification, &page.found.summary);
     let mut section = page.step("Friction law", Step::Friction);
-    let Some(friction) = &found.friction else {
-        section.paragraphs.push(if found.refinement.is_some() {
+    let (Some(friction), Some(figures)) = (&found.friction, &summary.friction) else {
+        let mut refined = found.refinement.iter().flat_map(|refinement| &refinement.parameters);
+        let of_law = [RefinedParameter::FrictionA, RefinedParameter::Coulomb];
+        section.paragraphs.push(if refined.any(|refined| of_law.contains(&refined.parameter)) {
             format!(
                 "No law was fitted to currents at constant velocities. The refinement in closed loop gives \
                  {}.",
                 describe(page, &page.axis().friction)
             )
         } else {
-            "No friction law was identified; the values of the machine file are kept.".to_owned()
+            "No friction law was identified; the values of the initial machine are kept.".to_owned()
         });
         return section;
     };
     let refined = refined(page, friction, &found.steady.levels);
-    section.paragraphs.push(text(page, friction));
+    section.paragraphs.push(format!(
+        "{}. V is in {}, b and d are in {}. The model uses the same law for both directions.",
+        capital(&figures::friction(figures)),
+        summary.speed_unit,
+        page.exponent_unit()
+    ));
     if refined.is_some() {
         let law = describe(page, &page.axis().friction);
         section.paragraphs.push(format!("The refinement in closed loop changes it to {law}."));
     }
+    section.tables.push(figures::friction_laws(figures));
     if found.steady.levels.is_empty() {
-        // A regression over all motion has no measured levels.
+        let now = drive::Friction::new(page.axis().friction, page.kind(), 1.0, 1.0);
+        let points = friction_points(page.found, |v| now.bound(v).copysign(v));
+        if !points.is_empty() {
+            section.paragraphs.push(
+                "Points are means of the recorded current at similar speeds, less inertia and gravity of the model; bars are \
+                 standard deviations of the samples."
+                    .to_owned(),
+            );
+            section.charts.push(chart(page, friction, None, (&points, "standard deviation")));
+        }
         return section;
     }
-    section.tables.push(table(page, friction, &found.steady.levels));
-    section.charts.push(chart(page, friction, refined.as_ref(), &found.steady.levels));
+    section.tables.push(figures::friction_currents(figures, summary.speed_unit));
+    let levels = (found.steady.levels.as_slice(), "standard error");
+    section.charts.push(chart(page, friction, refined.as_ref(), levels));
     section
-}
-
-fn text(page: &IdentificationPage, friction: &FrictionFit) -> String {
-    let (law, unit) = (&friction.law, page.velocity_unit().symbol);
-    let r2 = format_r_squared(law.r_squared);
-    let mut text = match law.line() {
-        Some((level, slope)) => format!(
-            "A Coulomb level and a viscous slope are fitted, because the speeds do not determine the four \
-             parameters of Prévost eq. 3: i = {} A + {} A/({unit}) · V, R² {r2}.",
-            digits(level, 4),
-            digits(slope, 3)
-        ),
-        None => format!(
-            "The double exponential law of Prévost eq. 3 is fitted to both directions jointly: {}, R² {r2}.",
-            describe(page, &law.config)
-        ),
-    };
-    text += &format!(" i0 = {} A.", digits(law.config.i0, 4));
-    if friction.asymmetry.is_finite() {
-        text += &format!(
-            " The directions differ by up to {} % of the friction; the law is the same for both.",
-            percent(friction.asymmetry)
-        );
-    }
-    text
 }
 
 /// Formats a friction law with its values.
@@ -104,7 +98,7 @@ fn chart(
     page: &IdentificationPage,
     friction: &FrictionFit,
     refined: Option<&drive::Friction>,
-    levels: &[SteadyCurrent],
+    (levels, bars): (&[SteadyCurrent], &str),
 ) -> Chart {
     let unit = page.velocity_unit();
     let measured = |label: &str, group: usize, sign: f64| {
@@ -140,43 +134,7 @@ fn chart(
         ..Panel::new(ChartAxis::new("Friction current", DisplayUnit::AMPERE), series)
     };
     Chart {
-        note: format!("{kind}, R² {}; bars: standard error", format_r_squared(friction.law.r_squared)),
+        note: format!("{kind}, R² {}; bars: {bars}", format_r_squared(friction.law.r_squared)),
         ..Chart::new("Friction law", ChartAxis::new("Velocity", unit), vec![panel])
-    }
-}
-
-fn table(page: &IdentificationPage, friction: &FrictionFit, levels: &[SteadyCurrent]) -> Table {
-    let unit = page.velocity_unit();
-    let row = |level: &SteadyCurrent| {
-        let v = level.velocity / unit.size;
-        let difference = |law: &LawFit| percent((law.at(v) - level.friction) / level.friction);
-        let own = friction.directions[usize::from(level.velocity < 0.0)].as_ref();
-        vec![
-            plain(level.velocity, &unit, 4),
-            digits(level.current, 4),
-            digits(level.friction, 4),
-            digits(level.error, 2),
-            digits(friction.law.at(v), 4),
-            difference(&friction.law),
-            own.map_or_else(String::new, |law| digits(law.at(v), 4)),
-            own.map_or_else(String::new, difference),
-            format!("{:.1}", level.duration),
-        ]
-    };
-    let heads = [
-        ("velocity", unit.symbol),
-        ("current", "A"),
-        ("friction current", "A"),
-        ("±", "A"),
-        ("law", "A"),
-        ("law − friction", "%"),
-        ("law of the direction", "A"),
-        ("its deviation", "%"),
-        ("duration", "s"),
-    ];
-    Table {
-        caption: "Constant velocities".to_owned(),
-        columns: columns(heads),
-        rows: levels.iter().map(row).collect(),
     }
 }

@@ -1,79 +1,44 @@
 //! Section of gravity: currents at standstill and the gravity model.
 
-use super::super::chart::{Chart, ChartAxis, ChartSeries, Panel, SeriesStyle};
-use super::super::document::Section;
-use super::super::scale::Extent;
-use super::super::table::Table;
-use super::super::unit::DisplayUnit;
-use super::format::{columns, digits};
-use super::{IdentificationPage, Step};
 use virtual_axes_core::config::AxisKind;
-use virtual_axes_core::units::DEGREE;
-use virtual_axes_identify::identify::summary::{Estimate, GravitySummary};
+use virtual_axes_identify::identify::summary::GravitySummary;
 use virtual_axes_identify::identify::{GravityCurrent, GravitySource, Standstill};
+
+use super::figures;
+use super::page::IdentificationPage;
+use super::step::Step;
+use crate::extent::Extent;
+use crate::text::{capital, digits};
+use crate::{Chart, ChartAxis, ChartSeries, DisplayUnit, Panel, Section, SeriesStyle, Table};
 
 /// Number of points of the line of the gravity model.
 const LINE_POINTS: usize = 181;
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
-    let found = page.identification;
+    let found = &page.found.identification;
     let mut section = page.step("Gravity", Step::Gravity);
-    let Some(gravity) = &page.summary.gravity else {
-        section.paragraphs.push(
-            "Gravity was not identified: the recordings have no current at standstill, and none at constant \
-             velocities in both directions. The value of the machine file is kept."
-                .to_owned(),
-        );
+    let Some(gravity) = &page.found.summary.gravity else {
+        section
+            .paragraphs
+            .push("Gravity was not identified; the value of the initial machine is kept.".to_owned());
         return section;
     };
-    let from = match gravity.source {
+    let method = match gravity.source {
         GravitySource::Regression => {
-            "a regression of the current over all samples in motion, together with inertia and friction"
+            "Friction changes its sign with the direction of motion, gravity does not: the current of all samples in motion shows \
+             both beside the inertia."
         }
-        GravitySource::Motion => {
-            "constant velocities in both directions, at which friction changes its sign and gravity does not"
-        }
-        GravitySource::Rest => {
-            "standstills, at which friction changes its sign with the direction of approach"
+        GravitySource::Motion | GravitySource::Rest => {
+            "At constant velocity and at rest the acceleration is zero (Prévost eq. 2), and the current is the sum of friction, \
+             which changes its sign with the direction of motion or of approach, and gravity, which does not."
         }
     };
-    section.paragraphs.push(format!(
-        "At constant velocity and at rest the acceleration is zero (Prévost eq. 2), and the current is the \
-         sum of friction and gravity. Gravity is identified from {from}. {}",
-        sentence(page, gravity)
-    ));
+    section.paragraphs.push(format!("{method} {}.", capital(&figures::gravity(gravity))));
     if !found.steady.standstills.is_empty() {
         section.charts.push(chart(page, gravity, &found.steady.standstills));
     }
     section.tables.push(table(page.kind(), gravity));
     section
-}
-
-/// Returns a sentence with the gravity in the units of the machine file.
-fn sentence(page: &IdentificationPage, gravity: &GravitySummary) -> String {
-    let pair = |found: Estimate| format!("{} ± {}", digits(found.value, 4), digits(found.error, 2));
-    if gravity.model == GravityCurrent::default() {
-        return "It is not significant; the model has no gravity.".to_owned();
-    }
-    let weight = gravity.weight_n.map(|weight| format!("W = {} N", pair(weight)));
-    let tilt = gravity.tilt_nm.map(|tilt| format!("k = {} N·m", pair(tilt)));
-    let phase = gravity.tilt_phase_deg.map(|phase| format!("φ = {}°", pair(phase)));
-    let parts: Vec<String> = [weight, tilt, phase].into_iter().flatten().collect();
-    let found = page.axis().gravity;
-    let refined = gravity.weight_n.is_some_and(|w| w.value != found.weight)
-        || gravity.tilt_nm.is_some_and(|k| k.value != found.tilt);
-    let more = if !refined {
-        String::new()
-    } else if page.kind() == AxisKind::Linear {
-        format!("; refined in closed loop W = {} N", digits(found.weight, 4))
-    } else {
-        format!(
-            "; refined in closed loop k = {} N·m, φ = {}°",
-            digits(found.tilt, 4),
-            digits(found.phase / DEGREE, 4)
-        )
-    };
-    format!("This gives {}{more}.", parts.join(", "))
 }
 
 fn chart(page: &IdentificationPage, gravity: &GravitySummary, rests: &[Standstill]) -> Chart {
@@ -142,7 +107,7 @@ fn table(kind: AxisKind, gravity: &GravitySummary) -> Table {
         rows.push(part("factor of sin q", |g| g.sine));
         rows.push(part("factor of cos q", |g| g.cosine));
     }
-    let heads =
+    let columns =
         [("current", ""), ("in motion", "A"), ("±", "A"), ("at rest", "A"), ("±", "A"), ("model", "A")];
-    Table { caption: "Gravity as motor current".to_owned(), columns: columns(heads), rows }
+    Table { rows, ..Table::new("Gravity as motor current", &columns) }
 }

@@ -1,12 +1,14 @@
 //! Section of the equivalent inertia at accelerating samples.
 
-use super::super::chart::{Band, Chart, ChartAxis, ChartSeries, Guide, Panel, SeriesStyle};
-use super::super::document::Section;
-use super::super::scale::Extent;
-use super::super::unit::DisplayUnit;
-use super::format::{counted, digits, percent};
-use super::{IdentificationPage, Step};
-use virtual_axes_identify::identify::InertiaFit;
+use virtual_axes_identify::identify::{InertiaFit, RefinedParameter};
+use virtual_axes_identify::recording::Signals;
+
+use super::figures;
+use super::page::{IdentificationPage, with_unit};
+use super::step::Step;
+use crate::extent::Extent;
+use crate::text::capital;
+use crate::{Band, Chart, ChartAxis, ChartSeries, DisplayUnit, Guide, Panel, Section, SeriesStyle};
 
 /// Fraction of the smallest and of the largest values that the plot may cut off.
 const OUTLIERS: f64 = 0.02;
@@ -14,67 +16,42 @@ const OUTLIERS: f64 = 0.02;
 const MARGIN: f64 = 0.06;
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
-    let found = page.identification;
+    let found = &page.found.identification;
     let mut section = page.step("Equivalent inertia", Step::Inertia);
-    let value = with_unit(page, page.axis().motor.inertia);
-    let Some(inertia) = &found.inertia else {
-        section.paragraphs.push(if found.refinement.is_some() {
+    let (Some(inertia), Some(figures)) = (&found.inertia, &page.found.summary.inertia) else {
+        let refined = found.refinement.iter().flat_map(|refinement| &refinement.parameters);
+        section.paragraphs.push(if refined.into_iter().any(|p| p.parameter == RefinedParameter::Inertia) {
             format!(
                 "Prévost eq. 5 requires accelerations with currents, which were not recorded. The refinement \
-                 in closed loop gives {value}."
+                 in closed loop gives {}.",
+                with_unit(page.axis().motor.inertia, &page.inertia_unit(), 4)
             )
         } else {
-            "The inertia was not identified; the value of the machine file is kept.".to_owned()
+            "The inertia was not identified; the value of the initial machine is kept.".to_owned()
         });
         return section;
     };
-    if inertia.is_regression() {
-        section.paragraphs.push(format!(
-            "The current of all samples in motion ({}) is fitted by Jeq a / (Kt r), friction and gravity together. This \
-             gives {} ± {}; the standard error counts moves, not samples.",
-            counted(inertia.accelerations, "move"),
-            with_unit(page, inertia.value),
-            digits(inertia.error, 2),
-        ));
-        return section;
+    let sentence = format!("{}, in {}.", capital(&figures::inertia(figures)), page.inertia_unit().symbol);
+    section.paragraphs.push(sentence);
+    section.paragraphs.push(match (inertia.is_regression(), found.replayed_inertia) {
+        (true, _) => "The current of all samples in motion is fitted by Jeq a / (Kt r), friction and gravity together; the \
+                      standard error counts moves, not samples.",
+        (false, None) => "Prévost eq. 5 is Jeq = (Kt i − C_friction − C_gravity) / (dω/dt); the value is the mean without outliers.",
+        (false, Some(_)) => "Prévost eq. 5 is Jeq = (Kt i − C_friction − C_gravity) / (dω/dt); the value is the mean without \
+                             outliers. Eq. 5 on the simulated axis, sampled like the recordings, shows the error of the method, \
+                             because the current oscillates between two samples. The refined inertia does not have this error.",
+    }.to_owned());
+    if !inertia.is_regression() {
+        section.charts.push(chart(page, inertia));
     }
-    section.paragraphs.push(format!(
-        "Jeq = (Kt i − C_friction − C_gravity) / (dω/dt) (Prévost eq. 5) at {} of {} gives {} ± {}, the mean \
-         without outliers. The standard deviation of single samples is {}.",
-        counted(inertia.instants.len(), "sample"),
-        counted(inertia.accelerations, "acceleration"),
-        with_unit(page, inertia.value),
-        digits(inertia.error, 2),
-        digits(inertia.spread, 2),
-    ));
-    if found.refinement.is_some() {
-        section.paragraphs.push(format!("The refinement in closed loop gives {value}."));
-    }
-    if let Some(replayed) = found.replayed_inertia {
-        let deviation = replayed / page.axis().motor.inertia - 1.0;
-        section.paragraphs.push(format!(
-            "Eq. 5 applied to the simulated axis, sampled like the recordings, gives {}, which deviates by \
-             {} % from the simulated inertia. This is the error of the method, because the current \
-             oscillates between two samples. The inertia refined in closed loop does not have this error.",
-            with_unit(page, replayed),
-            percent(deviation)
-        ));
-    }
-    section.charts.push(chart(page, inertia));
     section
 }
 
-fn with_unit(page: &IdentificationPage, inertia: f64) -> String {
-    format!("{}\u{a0}{}", digits(inertia, 4), page.inertia_unit().symbol)
-}
-
 fn chart(page: &IdentificationPage, inertia: &InertiaFit) -> Chart {
-    let found = page.identification;
+    let (found, unit) = (&page.found.identification, page.inertia_unit());
     // Samples are numbered by the recordings that have a current.
-    let has_current = |signals: &virtual_axes_identify::recording::Signals| {
-        signals.spans.iter().any(|s| s.current.is_some())
-    };
-    let names = page.inputs.iter().map(|input| input.signals).filter(|signals| has_current(signals));
+    let has_current = |signals: &&Signals| signals.spans.iter().any(|s| s.current.is_some());
+    let names = page.found.recordings.iter().map(|recorded| &recorded.signals).filter(has_current);
     let series: Vec<ChartSeries> = names
         .enumerate()
         .map(|(number, signals)| {
@@ -84,18 +61,17 @@ fn chart(page: &IdentificationPage, inertia: &InertiaFit) -> Chart {
         })
         .filter(|series| !series.points.is_empty())
         .collect();
-    let mut lines = vec![Guide::new(inertia.value, format!("eq. 5: {}", with_unit(page, inertia.value)))];
+    let mut lines = vec![Guide::new(inertia.value, format!("eq. 5: {}", with_unit(inertia.value, &unit, 4)))];
     if found.refinement.is_some() {
         let refined = page.axis().motor.inertia;
-        lines.push(Guide::new(refined, format!("refined: {}", with_unit(page, refined))));
+        lines.push(Guide::new(refined, format!("refined: {}", with_unit(refined, &unit, 4))));
     }
     let mut values: Vec<f64> = inertia.instants.iter().map(|instant| instant.2).collect();
     values.sort_by(f64::total_cmp);
     let outliers = (OUTLIERS * values.len() as f64) as usize;
     let inner = values.get(outliers..values.len() - outliers).unwrap_or_default();
-    let marked = Extent::of(lines.iter().map(|line| line.at));
-    let shown = Extent::join(Extent::of(inner.iter().copied()), marked);
-    let mut y = ChartAxis::new("Equivalent inertia", page.inertia_unit());
+    let shown = Extent::of(inner.iter().copied().chain(lines.iter().map(|line| line.at)));
+    let mut y = ChartAxis::new("Equivalent inertia", unit);
     if let Some(shown) = shown.filter(|shown| shown.span() > 0.0) {
         let room = MARGIN * shown.span();
         y = y.within(shown.min - room, shown.max + room);

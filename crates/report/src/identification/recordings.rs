@@ -1,73 +1,55 @@
 //! Section of the recordings: contents, and segmentation into standstill, constant velocity and acceleration
 //! (Prévost fig. 4).
 
-use super::super::chart::{Band, BandClass, Chart, ChartAxis, ChartSeries, Panel, SeriesStyle};
-use super::super::document::Section;
-use super::super::table::Table;
-use super::super::unit::DisplayUnit;
-use super::format::{columns, digits, exact};
-use super::{IdentificationPage, notices};
 use virtual_axes_identify::identify::summary::RecordingSummary;
-use virtual_axes_identify::identify::{Agreement, MotionSegment, SegmentKind};
-use virtual_axes_identify::recording::{Finding, SignalSpan, Signals};
+use virtual_axes_identify::identify::{Agreement, ConditionedRecording, MotionSegment, SegmentKind};
+use virtual_axes_identify::recording::{SignalSpan, Signals};
+
+use super::figures;
+use super::page::{IdentificationPage, notice};
+use crate::{
+    Band, BandClass, Chart, ChartAxis, ChartSeries, DisplayUnit, Panel, Section, SeriesStyle, Table,
+    TableColumn,
+};
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
-    let agreements = page.identification.agreements.iter().map(Some).chain(std::iter::repeat(None));
-    let charts = page.inputs.iter().zip(agreements).map(|(input, a)| chart(page, input.signals, a));
-    let findings = page.findings.iter().take(page.inputs.len()).flatten();
+    let (found, recordings) = (page.found, &page.found.recordings);
+    let agreements = found.identification.agreements.iter().map(Some).chain(std::iter::repeat(None));
+    let charts = recordings.iter().zip(agreements).map(|(recorded, a)| chart(page, &recorded.signals, a));
     let text = "Velocity and acceleration are derivatives of the position after a zero-phase low-pass \
                 filter; its cut-off frequency is at −3 dB. Shaded intervals are the segments of the motion \
-                (Prévost fig. 4); parts that are too short or not steady are not used.";
+                (Prévost fig. 4); parts that are too short or not steady belong to none.";
     Section {
         paragraphs: vec![text.to_owned()],
-        notices: findings.map(notices::notice).collect(),
-        tables: vec![table(&page.summary.recordings)],
+        notices: recordings.iter().flat_map(|recorded| &recorded.findings).map(notice).collect(),
+        tables: vec![table(&found.summary.recordings)],
         charts: charts.collect(),
         ..Section::new("Recordings")
     }
 }
 
 /// Creates a section with the notices and the table of one recording.
-pub(super) fn single_recording(recording: &RecordingSummary, findings: &[Finding]) -> Section {
+pub(super) fn single_recording(recorded: &ConditionedRecording, recording: &RecordingSummary) -> Section {
     Section {
-        notices: findings.iter().map(notices::notice).collect(),
+        notices: recorded.findings.iter().map(notice).collect(),
         tables: vec![table(std::slice::from_ref(recording))],
         ..Section::default()
     }
 }
 
+/// Lists recordings with their sections and the parts of their motion.
 fn table(recordings: &[RecordingSummary]) -> Table {
-    let heads = [
-        ("recording", ""),
-        ("samples", ""),
-        ("period", "ms"),
-        ("cut-off", "Hz"),
-        ("current lag, compensated", "ms"),
-        ("spans", ""),
-        ("feedforward", ""),
-        ("static", "s"),
-        ("constant velocity", "s"),
-        ("accelerating", "s"),
-    ];
-    Table {
-        caption: "Recordings".to_owned(),
-        columns: columns(heads),
-        rows: recordings.iter().map(row).collect(),
+    let mut table =
+        figures::recordings(recordings.iter().map(|recording| (recording.name.clone(), recording)));
+    table.columns.push(TableColumn::new("spans", ""));
+    table
+        .columns
+        .extend(["static", "constant velocity", "accelerating"].map(|name| TableColumn::new(name, "s")));
+    for (row, recording) in table.rows.iter_mut().zip(recordings) {
+        row.push(recording.spans.to_string());
+        row.extend(recording.segments_s.map(|duration| format!("{duration:.1}")));
     }
-}
-
-fn row(recording: &RecordingSummary) -> Vec<String> {
-    let mut row = vec![
-        recording.name.clone(),
-        recording.samples.to_string(),
-        exact(recording.period_ms),
-        digits(recording.cutoff_hz, 3),
-        digits(recording.current_lag_ms, 3),
-        recording.spans.to_string(),
-        recording.feedforward_names(),
-    ];
-    row.extend(recording.segments_s.map(|duration| format!("{duration:.1}")));
-    row
+    table
 }
 
 /// Creates the plot of velocity and current over time.

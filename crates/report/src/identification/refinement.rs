@@ -1,24 +1,32 @@
 //! Section of the refinement in closed loop: changes of the parameters and their correlations.
 
-use super::super::document::Section;
-use super::super::table::{Table, TableColumn};
-use super::super::text::{listed, number};
-use super::format::{columns, digits, percent};
-use super::{IdentificationPage, Step};
 use virtual_axes_identify::identify::summary::RefinementSummary;
 use virtual_axes_identify::identify::{RefinedParameter, RefinedValue};
 
+use super::figures;
+use super::page::{IdentificationPage, percent};
+use super::step::Step;
+use crate::text::{capital, digits, listed, number};
+use crate::{Section, Table, TableColumn};
+
 pub(super) fn section(page: &IdentificationPage) -> Section {
     let mut section = page.step("Refinement in closed loop", Step::Refinement);
-    let Some(refinement) = &page.summary.refinement else {
+    let Some(refinement) = &page.found.summary.refinement else {
         section.paragraphs.push(
-            "The refinement was not run; the values are those of the preceding steps, or of the machine \
-             file."
+            "The refinement was not run; the values are those of the preceding steps, or of the initial \
+             machine."
                 .to_owned(),
         );
         return section;
     };
-    section.paragraphs.push(text(page, refinement));
+    let signals = match refinement.current_rms_a {
+        Some(_) => "positions and currents, weighted by the residuals",
+        None => "positions",
+    };
+    section.paragraphs.push(format!(
+        "All parameters below are adjusted jointly to minimize the deviation of the simulated axis from the recorded {signals}. {}.",
+        capital(&figures::refinement(refinement, page.error_unit().symbol))
+    ));
     let pairs: Vec<String> = refinement
         .correlated_pairs
         .iter()
@@ -33,7 +41,7 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
             listed(&pairs)
         )
     });
-    let heads = [
+    let columns = [
         ("parameter", ""),
         ("initial", ""),
         ("refined", ""),
@@ -42,32 +50,12 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         ("change", "%"),
         ("at its bound", ""),
     ];
-    section.tables.push(Table {
-        caption: "Refined parameters".to_owned(),
-        columns: columns(heads),
-        rows: refinement.parameters.iter().map(|refined| row(page, refined)).collect(),
-    });
+    let rows = refinement.parameters.iter().map(|refined| row(page, refined)).collect();
+    section.tables.push(Table { rows, ..Table::new("Refined parameters", &columns) });
     if refinement.parameters.len() > 1 {
         section.tables.push(correlations(refinement));
     }
     section
-}
-
-fn text(page: &IdentificationPage, refinement: &RefinementSummary) -> String {
-    let unit = page.error_unit().symbol;
-    let of = |value: f64, unit: &str| format!("{}\u{a0}{unit}", digits(value, 3));
-    let current = refinement.current_rms_a.map_or_else(String::new, |current| {
-        let [before, after] = [current.before, current.after].map(|value| of(value, "A"));
-        format!(", the RMS of the current deviation from {before} to {after}")
-    });
-    format!(
-        "All parameters below are adjusted jointly to minimize the deviation of the simulated axis from the \
-         recorded positions{}, weighted by the residuals. The RMS of the position deviation changes from {} \
-         to {}{current}.",
-        if refinement.current_rms_a.is_some() { " and currents" } else { "" },
-        of(refinement.position_rms.before, unit),
-        of(refinement.position_rms.after, unit)
-    )
 }
 
 fn row(page: &IdentificationPage, refined: &RefinedValue) -> Vec<String> {
@@ -110,5 +98,5 @@ fn correlations(refinement: &RefinementSummary) -> Table {
         let cells = cells.map(|(k, rho)| if k < j { number(*rho, 2) } else { String::new() });
         std::iter::once(name.clone()).chain(cells).collect()
     });
-    Table { caption: "Coefficients of correlation".to_owned(), columns: heads, rows: rows.collect() }
+    Table { columns: heads, rows: rows.collect(), ..Table::new("Coefficients of correlation", &[]) }
 }

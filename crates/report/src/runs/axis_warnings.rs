@@ -1,11 +1,9 @@
 //! Warnings on parameters of an axis that are valid but implausible.
 
-use virtual_axes_core::config::{AxisConfig, Periods, PositionControllerConfig};
+use virtual_axes_core::config::{AxisConfig, AxisUnits, Periods, PositionControllerConfig};
 use virtual_axes_core::design::{DesignError, check_stable, has_stable_poles};
 use virtual_axes_core::machine::{AxisError, design_controller, prediction_model};
 use virtual_axes_core::units::Rounded;
-
-use super::AxisUnits;
 
 /// Returns all warnings on an axis.
 pub fn all(axis: &AxisConfig, periods: &Periods) -> Vec<String> {

@@ -1,9 +1,8 @@
 //! Figures of a run as a list: subject, quantity, unit and value. Tables, CSV and comparisons are made of it.
 
+use virtual_axes_core::config::AxisUnits;
 use virtual_axes_core::trial::{AxisFigures, CircleFigures, Figures, Reference};
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MICROMETER, MILLIDEGREE, MILLIMETER};
-
-use super::table::scale;
 
 /// One figure of a run.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -111,7 +110,7 @@ pub fn of_axes(figures: &Figures) -> Vec<Figure> {
 }
 
 fn of_axis(axis: &AxisFigures) -> Vec<Figure> {
-    let (unit, _, scale) = scale(axis.kind);
+    let AxisUnits { error: scale, error_name: unit, .. } = AxisUnits::for_kind(axis.kind);
     let r = &axis.report;
     let new = |name: &str, value: f64, unit| Figure::new(&axis.name, name, value, unit);
     vec![
@@ -189,6 +188,11 @@ fn of_contour(figures: &Figures, ends: bool) -> Vec<Figure> {
             let name = format!("{name}, without end overshoot");
             found.push(Figure::new("", &name, within_ends / MICROMETER, "µm"));
         }
+    }
+    if let Some(rapids) = contour.rapids {
+        let new = |name: &str, value: f64| Figure::new("", name, value / MICROMETER, "µm");
+        found.push(new("contour error at rapid traverse, max", rapids.max));
+        found.push(new("contour error at rapid traverse, RMS", rapids.rms));
     }
     found
 }

@@ -1,18 +1,15 @@
 //! Simulated runs in text: figures, tables, the verdict in one line, warnings on parameters, and the page.
 
 pub mod axis_warnings;
+pub mod comparison;
 pub mod figure;
 pub mod table;
 pub mod verdict;
 
-mod axis_units;
-mod feed_along_path;
 mod page;
 mod program_report;
 mod simulated_run;
 
-pub use axis_units::AxisUnits;
-pub use feed_along_path::FeedAlongPath;
 pub use page::SimulationPage;
 pub use program_report::ProgramReport;
 pub use simulated_run::{SimulatedRun, controller_name};

@@ -6,8 +6,9 @@ use virtual_axes_core::assess::SignalRecording;
 use virtual_axes_core::config::{AxisConfig, AxisKind, GpcConfig, PositionControllerConfig};
 use virtual_axes_core::units::{MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, seconds};
 
-use super::{SimulatedRun, table, verdict};
-use crate::{Report, ReportRun, Scatter, Section};
+use super::{SimulatedRun, comparison, table, verdict};
+use crate::text::capital;
+use crate::{Report, ReportRun, Section};
 
 /// Contents of the page of one or several simulated runs of one trial.
 #[derive(Debug)]
@@ -20,10 +21,8 @@ pub struct SimulationPage<'a> {
     pub machine: &'a str,
     /// Runs, the first of which the others are compared with.
     pub runs: &'a [SimulatedRun],
-    /// Sections below the figures, before those of part programs.
+    /// Sections above the figures, such as that of a search.
     pub sections: Vec<Section>,
-    /// Scatter plots of a search.
-    pub scatters: &'a [Scatter],
     /// Names and values that allow the runs to be repeated.
     pub provenance: Vec<(String, String)>,
 }
@@ -43,10 +42,10 @@ impl SimulationPage<'_> {
             title: self.title,
             description: self.description,
             verdict: verdict::lines(self.runs),
-            tables: table::comparison(self.runs).to_vec(),
-            notes: table::comparison_note(self.runs)
+            tables: comparison::tables(self.runs).to_vec(),
+            notes: comparison::note(self.runs)
                 .into_iter()
-                .chain(table::spike_note(self.runs))
+                .chain(comparison::spike_note(self.runs))
                 .chain([table::SAMPLING.to_owned()])
                 .collect(),
             runs: described
@@ -56,21 +55,28 @@ impl SimulationPage<'_> {
                     title,
                     facts: facts.clone(),
                     recording: run.outcome.recording.as_ref().unwrap_or(&empty),
+                    program: run.part_program.as_ref().map(|program| &program.path),
                 })
                 .collect(),
-            sections: self.sections.iter().cloned().chain(self.part_programs()).collect(),
+            overview: self.overview(),
+            sections: self.sections.clone(),
             provenance: self.provenance.clone(),
         };
-        report.write_with(self.scatters, output)
+        report.write(output)
     }
 
-    /// Returns the sections of part programs; their headings have the titles of the runs if there are several.
-    fn part_programs(&self) -> impl Iterator<Item = Section> {
-        let heading = |run: &SimulatedRun| match self.runs.len() {
-            1 => "Part program".to_owned(),
-            _ => format!("Part program: {}", run.title()),
-        };
-        self.runs.iter().filter_map(move |run| Some(run.part_program.as_ref()?.section(&heading(run))))
+    /// Returns times and worst lines of part programs, with the titles of the runs if there are several.
+    fn overview(&self) -> Section {
+        let mut section = Section::default();
+        for (index, run) in self.runs.iter().enumerate() {
+            let Some(program) = &run.part_program else { continue };
+            let of_run = if self.runs.len() > 1 { format!("{}: ", run.title()) } else { String::new() };
+            section.paragraphs.push(capital(&format!("{of_run}{}.", program.times())));
+            section.tables.push(
+                program.page_table(capital(&format!("{of_run}lines with the largest contour errors")), index),
+            );
+        }
+        section
     }
 }
 

@@ -1,31 +1,27 @@
-//! Times, worst lines and feed of a part program: texts, and a section of a page.
+//! Times, worst lines and path of a part program.
 
 use virtual_axes_core::units::MILLIDEGREE;
 use virtual_axes_nc::offline::{ProgramFigures, WorstLine};
 
-use super::FeedAlongPath;
-use crate::{Section, Table, TableColumn};
+use crate::{Table, TableColumn, ToolPath};
 
-/// Figures of a part program, and the feed along its path.
+/// Number of lines at rapid traverse in tables, behind those at feed.
+const RAPIDS: usize = 3;
+
+/// Figures of a part program, and its path.
 #[derive(Debug, Clone)]
 pub struct ProgramReport {
     /// Times and worst lines.
     pub figures: ProgramFigures,
-    /// Programmed and reached feed over the path position.
-    pub feed: FeedAlongPath,
+    /// Path with feeds and lines.
+    pub path: ToolPath,
 }
 
 impl ProgramReport {
-    /// Returns a section of a page: times, worst lines and feed along the path.
-    pub fn section(&self, heading: &str) -> Section {
-        let mut table = self.worst_table(str::to_owned);
-        table.caption = "Lines with the largest contour errors".to_owned();
-        Section {
-            paragraphs: vec![format!("{}.", self.times())],
-            tables: vec![table],
-            charts: vec![self.feed.chart()],
-            ..Section::new(heading)
-        }
+    /// Returns the worst lines as a table of the page, whose rows show their places.
+    pub fn page_table(&self, caption: String, run: usize) -> Table {
+        let instants = self.lines().map(|(worst, _)| (run, worst.time)).collect();
+        Table { caption, instants, ..self.worst_table(str::to_owned) }
     }
 
     /// Returns cycle time and programmed time as one line.
@@ -36,33 +32,44 @@ impl ProgramReport {
         )
     }
 
+    /// Returns the worst lines of the motions at feed, then those at rapid traverse, with the kind of motion.
+    fn lines(&self) -> impl Iterator<Item = (&WorstLine, &'static str)> {
+        let rapids = self.figures.worst_rapids.iter().take(RAPIDS);
+        self.figures
+            .worst_lines
+            .iter()
+            .map(|worst| (worst, "feed"))
+            .chain(rapids.map(|worst| (worst, "rapid")))
+    }
+
     /// Returns a table of the worst lines; `escape` is applied to the texts of lines.
     pub fn worst_table(&self, escape: impl Fn(&str) -> String) -> Table {
-        let column =
-            |name: &str, unit: &str| TableColumn { name: name.to_owned(), unit: unit.to_owned(), run: None };
-        let row = |worst: &WorstLine| {
+        let row = |(worst, motion): (&WorstLine, &str)| {
             vec![
                 worst.line.to_string(),
                 escape(&worst.text),
+                motion.to_owned(),
                 worst.cause.text(),
                 format!("{:.2}", worst.error * 1e6),
                 format!("{:.3}", worst.time),
             ]
         };
-        let mut columns = vec![
-            column("line", ""),
-            column("text", ""),
-            column("cause", ""),
-            column("contour error", "µm"),
-            column("time", "s"),
+        let columns = [
+            ("line", ""),
+            ("text", ""),
+            ("motion", ""),
+            ("cause", ""),
+            ("contour error", "µm"),
+            ("time", "s"),
         ];
-        let mut rows: Vec<Vec<String>> = self.figures.worst_lines.iter().map(row).collect();
-        if self.figures.worst_lines.iter().any(|worst| worst.orientation > 0.0) {
-            columns.insert(4, column("orientation error", "mdeg"));
-            for (row, worst) in rows.iter_mut().zip(&self.figures.worst_lines) {
-                row.insert(4, format!("{:.2}", worst.orientation / MILLIDEGREE));
+        let mut table = Table::new("", &columns);
+        table.rows.extend(self.lines().map(row));
+        if self.lines().any(|(worst, _)| worst.orientation > 0.0) {
+            table.columns.insert(5, TableColumn::new("orientation error", "mdeg"));
+            for (row, (worst, _)) in table.rows.iter_mut().zip(self.lines()) {
+                row.insert(5, format!("{:.2}", worst.orientation / MILLIDEGREE));
             }
         }
-        Table { caption: String::new(), columns, rows }
+        table
     }
 }

@@ -1,6 +1,6 @@
 //! One simulated run with its variant of the machine.
 
-use virtual_axes_core::config::{MachineConfig, Parameters, Value};
+use virtual_axes_core::config::{ControllerName, MachineConfig, Parameters, Value};
 use virtual_axes_core::kinematics::{AxisRole, Kinematics};
 use virtual_axes_core::trial::TrialOutcome;
 
@@ -20,7 +20,9 @@ pub fn controller_name(parameters: &Parameters) -> String {
         }
     }
     match names.as_slice() {
-        [name] if name == "cascade" && !feedforward => "cascade-noff".to_owned(),
+        [name] if name == ControllerName::Cascade.name() && !feedforward => {
+            ControllerName::CASCADE_WITHOUT_FEEDFORWARD.to_owned()
+        }
         _ => names.join("+"),
     }
 }
@@ -93,7 +95,8 @@ impl SimulatedRun {
         let names: Vec<&str> = without.map(|(_, axis)| axis.name.as_str()).collect();
         (!names.is_empty()).then(|| {
             format!(
-                "the contour error does not contain {}: the tool is moved by joints named x, y, z, a and c",
+                "the contour error does not contain {}: the tool is moved by joints named x, y, z, a, b and c \
+                 (kinematics.chain)",
                 names.join(", ")
             )
         })

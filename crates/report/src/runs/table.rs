@@ -1,28 +1,14 @@
 //! Tables of figures for the terminal and for reports.
 
-use virtual_axes_core::config::AxisKind;
+use virtual_axes_core::config::AxisUnits;
 use virtual_axes_core::trial::{AxisFigures, Figures};
-use virtual_axes_core::units::{MICROMETER, MILLIDEGREE, Rounded};
+use virtual_axes_core::units::Rounded;
 
-use super::SimulatedRun;
-use super::figure::{self, Figure};
-use crate::{Table, TableColumn};
+use super::figure;
+use crate::Table;
 
 /// Reason for a missing contour error.
 pub const NO_CONTOUR: &str = "no linear joint is named x, y or z";
-
-/// Returns symbol, ASCII name and size in SI units of the unit of an axis's errors.
-pub fn scale(kind: AxisKind) -> (&'static str, &'static str, f64) {
-    match kind {
-        AxisKind::Linear => ("µm", "um", MICROMETER),
-        AxisKind::Rotary => ("mdeg", "mdeg", MILLIDEGREE),
-    }
-}
-
-fn table(caption: &str, columns: &[(&str, &str)]) -> Table {
-    let columns = columns.iter().map(|&(name, unit)| TableColumn::new(name, unit)).collect();
-    Table { caption: caption.to_owned(), columns, rows: Vec::new() }
-}
 
 /// Creates the table of following errors, currents and saturation of the moving axes, or of all axes if none
 /// moves.
@@ -38,10 +24,10 @@ pub fn axes(figures: &Figures) -> Table {
         ("time at a limit", "s"),
         ("activity", "A"),
     ];
-    let mut table = table("Axes", &columns);
+    let mut table = Table::new("Axes", &columns);
     let none_moves = figures.axes.iter().all(|axis| !axis.moves);
     for axis in figures.axes.iter().filter(|axis| axis.moves || none_moves) {
-        let (unit, _, scale) = scale(axis.kind);
+        let AxisUnits { error: scale, error_name: unit, .. } = AxisUnits::for_kind(axis.kind);
         let r = &axis.report;
         let errors = [
             r.max_following_error,
@@ -106,71 +92,13 @@ pub fn more(figures: &Figures) -> impl Iterator<Item = String> {
 
 /// Creates the table of contour error, orientation error, circles and corners.
 pub fn path(figures: &Figures) -> Table {
-    let mut table = table("Path", &[("path error", ""), ("value", ""), ("unit", "")]);
+    let mut table = Table::new("Path", &[("path error", ""), ("value", ""), ("unit", "")]);
     let figures =
         figure::of_path(figures, figure::overshoots(figures)).into_iter().chain(figure::of_circles(figures));
     for figure in figures {
         table.rows.push(vec![figure.title(), figure.text(), figure.unit.to_owned()]);
     }
     table
-}
-
-/// Creates tables with a row per figure and a column per run: path, circular tests, and axes. From the second run on, a
-/// cell has the difference from the first run.
-pub fn comparison(runs: &[SimulatedRun]) -> [Table; 3] {
-    // The tables of all runs have equal rows.
-    let ends = runs.iter().any(|run| figure::overshoots(&run.outcome.figures));
-    let axes: Vec<_> = runs.iter().map(|run| figure::of_axes(&run.outcome.figures)).collect();
-    let path: Vec<_> = runs.iter().map(|run| figure::of_path(&run.outcome.figures, ends)).collect();
-    let circles: Vec<_> = runs.iter().map(|run| figure::of_circles(&run.outcome.figures)).collect();
-    [
-        columns_of("Path", runs, &path),
-        columns_of("Circular tests (ISO 230-4)", runs, &circles),
-        columns_of("Axes", runs, &axes),
-    ]
-}
-
-fn columns_of(caption: &str, runs: &[SimulatedRun], figures: &[Vec<Figure>]) -> Table {
-    let mut table = table(caption, &[("figure", ""), ("unit", "")]);
-    match runs {
-        [_] => table.columns.push(TableColumn::new("value", "")),
-        _ => {
-            table.columns.extend(runs.iter().enumerate().map(|(i, run)| TableColumn::of_run(run.title(), i)))
-        }
-    }
-    let Some((first, others)) = figures.split_first() else { return table };
-    let mut subject = "";
-    for (row, base) in first.iter().enumerate() {
-        // The figures of an axis, circle or corner stand below its name.
-        if base.subject != subject {
-            table.rows.push(vec![base.subject.clone()]);
-            subject = &base.subject;
-        }
-        let name = if base.subject.is_empty() { base.name.clone() } else { format!("– {}", base.name) };
-        let mut cells = vec![name, base.unit.to_owned(), base.text()];
-        let same = |run: &Vec<Figure>| run.get(row).map(|figure| figure.compared_text(base));
-        cells.extend(others.iter().map(|run| same(run).unwrap_or_default()));
-        table.rows.push(cells);
-    }
-    table
-}
-
-/// Returns the explanation of the differences in [`comparison`].
-pub fn comparison_note(runs: &[SimulatedRun]) -> Option<String> {
-    let first = runs.first().filter(|_| runs.len() > 1)?;
-    Some(format!(
-        "in parentheses: difference from {} in percent, of signed figures in their unit",
-        first.title()
-    ))
-}
-
-/// Returns the definition of the reversal spikes, for runs with circles.
-pub fn spike_note(runs: &[SimulatedRun]) -> Option<String> {
-    let has_circle = runs.iter().any(|run| !run.outcome.figures.circles.is_empty());
-    has_circle.then(|| {
-        "reversal spike: the radial deviation within 20° of a reversal that differs most from the mean, minus the mean"
-            .to_owned()
-    })
 }
 
 /// Sampling of the contour errors and radial deviations.

@@ -1,6 +1,7 @@
 //! The result of runs in one line each, with which text output and reports begin.
 
 use virtual_axes_core::trial::Figures;
+use virtual_axes_core::units::MICROMETER;
 
 use super::figure::{self, Figure, percent};
 use super::{SimulatedRun, table};
@@ -21,7 +22,12 @@ fn single(run: &SimulatedRun) -> String {
     let text = match contour.get(1) {
         _ if figures.axes.iter().all(|axis| !axis.moves) => "no axis moves".to_owned(),
         Some(rms) if main.subject.is_empty() => {
+            let rapids = figures
+                .contour
+                .and_then(|contour| contour.rapids)
+                .map(|rapids| format!(" at feed; at rapid traverse {:.1} µm max", rapids.max / MICROMETER));
             format!("contour error {} µm max, {} µm RMS", main.text(), rms.text())
+                + &rapids.unwrap_or_default()
         }
         _ => format!("{} {} {}", without_max(&main), main.text(), main.unit),
     };

@@ -5,4 +5,3 @@ mod report_compare;
 mod report_document;
 mod report_identification;
 mod report_page;
-mod report_search;

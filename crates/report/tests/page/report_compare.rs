@@ -1,6 +1,6 @@
 //! Pages of several runs: paths at different positions, long names.
 
-use crate::report_common::{between, picture, points, report_run};
+use crate::report_common::{between, column, figure, report_run};
 use virtual_axes_core::assess::{SignalRecording, ToolTrace};
 use virtual_axes_report::{Report, ReportRun};
 
@@ -34,38 +34,18 @@ fn helix(start: [f64; 3]) -> SignalRecording {
     SignalRecording { time, tool: Some(tool), ..SignalRecording::default() }
 }
 
-/// Returns width and height of a run's path in its plot, pixels.
-fn size(page: &str, title: &str) -> [f64; 2] {
-    let path = points(between(picture(page, title), "<path class=\"reference\" d=\"", "\"")[0]);
-    [0, 1].map(|i| {
-        let values = || path.iter().map(|p| p[i]);
-        values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)
-    })
-}
-
 #[test]
-fn an_offset_path_does_not_change_the_projection_plane() {
+fn paths_of_all_runs_are_in_one_figure_with_their_places() {
     // A tool that is 100 mm shorter lowers the whole path.
     let (high, low) = (helix([0.0; 3]), helix([0.0, 0.0, -0.1]));
     let page = page(vec![report_run("long", &high), report_run("short", &low)]);
-    let [long, short] = ["X–Y path, long<", "X–Y path, short<"].map(|title| size(&page, title));
-    assert_eq!(long, short);
-    assert!(!page.contains("X–Z path"));
-}
-
-#[test]
-fn distant_paths_have_one_scale_and_separate_ranges() {
-    let (near, far) = (helix([0.0; 3]), helix([0.0, 0.5, 0.0]));
-    let page = page(vec![report_run("near", &near), report_run("far", &far)]);
-    let alone = self::page(vec![report_run("near", &near)]);
-    let [near, far] = ["X–Y path, near<", "X–Y path, far<"].map(|title| size(&page, title));
-    // Points are written to a tenth of a pixel.
-    for i in 0..2 {
-        assert!((near[i] - far[i]).abs() < 0.3, "{near:?} {far:?}");
-        assert!((near[i] - size(&alone, "X–Y path")[i]).abs() < 0.3, "{near:?}");
-    }
-    let labels = |title: &str| between(picture(&page, title), "<text class=\"tick", "</text>").join(" ");
-    assert!(labels("X–Y path, far<").contains(">500") && !labels("X–Y path, near<").contains(">500"));
+    let path = figure(&page, "Path of the tool");
+    let starts = [0, 1].map(|run| [0, 1, 2].map(|axis| column(&path["runs"][run]["reference"][axis])[0]));
+    assert_eq!(starts, [[20.0, 0.0, 0.0], [20.0, 0.0, -100.0]]);
+    // The path over the turns, mm: each turn is longer than its circle.
+    let length = column(&path["runs"][0]["path"]).pop().expect("points");
+    let expected = (TURNS * std::f64::consts::TAU * RADIUS).hypot(RISE) * 1e3;
+    assert!((length / expected - 1.0).abs() < 1e-3, "{length} {expected}");
 }
 
 #[test]

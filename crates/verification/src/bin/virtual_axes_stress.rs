@@ -7,10 +7,10 @@ use std::process::ExitCode;
 use std::thread;
 
 use clap::Parser;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use virtual_axes_core::config::Parameters;
 use virtual_axes_core::machine::SimdWidth;
+use virtual_axes_verification::print_result;
 use virtual_axes_verification::stress::{
     self, StressOptions, StressSummary, TestMachines, TestPlan, TrajectoryTest,
 };
@@ -34,9 +34,6 @@ struct Arguments {
     /// Number of threads; default: all cores. The result does not depend on it.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// SIMD width. The result does not depend on it.
-    #[arg(long, value_enum, default_value_t = WidthName::Widest)]
-    width: WidthName,
     /// Shipped machine or machine file, tested with each kind of controller; default: all shipped machines. Can be given
     /// several times.
     #[arg(long)]
@@ -49,49 +46,15 @@ struct Arguments {
     json: bool,
 }
 
-/// SIMD width on the command line.
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum WidthName {
-    /// Widest vectors of this processor.
-    Widest,
-    /// Widest vectors of this processor, at most four numbers.
-    Four,
-    /// Vectors of the baseline instruction set; slow.
-    Baseline,
-}
-
-impl From<WidthName> for SimdWidth {
-    fn from(name: WidthName) -> Self {
-        match name {
-            WidthName::Widest => SimdWidth::Widest,
-            WidthName::Four => SimdWidth::Four,
-            WidthName::Baseline => SimdWidth::Baseline,
-        }
-    }
-}
-
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(text) => {
-            print!("{text}");
-            ExitCode::SUCCESS
-        }
-        Err(error) => {
-            eprintln!("{error}");
-            ExitCode::from(2)
-        }
-    }
+    print_result(run(&Arguments::parse()))
 }
 
 /// Runs the trajectories and returns the summary. The error lists the violations.
-fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
-    let machines = if arguments.machine.is_empty() {
-        TestMachines::shipped()?
-    } else {
-        let machines: Result<Vec<_>, _> =
-            arguments.machine.iter().map(|machine| Parameters::load(machine)).collect();
-        TestMachines::new(&machines?)?
-    };
+fn run(arguments: &Arguments) -> Result<String, Box<dyn Error + Send + Sync>> {
+    let load = |machine: &String| Parameters::load(machine, virtual_axes_builtin::MACHINES);
+    let given = arguments.machine.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    let machines = if given.is_empty() { TestMachines::shipped()? } else { TestMachines::new(&given)? };
     if let Some(number) = arguments.only {
         return only(&machines, arguments, number);
     }
@@ -101,16 +64,9 @@ fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
         first: arguments.first,
         count: arguments.count,
         threads: arguments.threads.map_or_else(cores, usize::from),
-        width: arguments.width.into(),
+        width: SimdWidth::Widest,
     };
-    let progress = ProgressBar::new(options.count);
-    progress.set_style(ProgressStyle::with_template("{wide_bar} {pos} of {len} trajectories, {eta} left")?);
-    let summary = stress::run(&machines, &options, |run| {
-        progress.set_position(run);
-        Ok(())
-    });
-    progress.finish_and_clear();
-    let summary = summary?;
+    let summary = stress::run(&machines, &options)?;
     if !summary.violations.is_empty() {
         let mut text = format!("{} trajectories with violations, seed {}", summary.violating, options.seed);
         for violation in &summary.violations {
@@ -118,18 +74,18 @@ fn run(arguments: &Arguments) -> Result<String, Box<dyn Error>> {
         }
         return Err(text.into());
     }
-    Ok(if arguments.json {
-        format!("{:#}\n", object(&machines, &options, &summary))
-    } else {
-        text(&machines, &options, &summary)
-    })
+    Ok(if arguments.json { format!("{:#}\n", object(&machines, &options, &summary)) } else { text(&summary) })
 }
 
 /// Runs one trajectory and returns its plan and figures as text.
-fn only(machines: &TestMachines, arguments: &Arguments, number: u64) -> Result<String, Box<dyn Error>> {
+fn only(
+    machines: &TestMachines,
+    arguments: &Arguments,
+    number: u64,
+) -> Result<String, Box<dyn Error + Send + Sync>> {
     let plan = TestPlan::new(machines, arguments.seed, number)?;
     let variant = &machines.variants()[plan.variant];
-    let record = TrajectoryTest::new(machines, arguments.seed, arguments.width.into()).run(number)?;
+    let record = TrajectoryTest::new(machines, arguments.seed, SimdWidth::Widest).run(number)?;
     let mut text = format!("{}, {}\n{plan:#?}\n{:#?}\n", variant.machine, variant.controllers, record.axes);
     for violation in &record.violations {
         writeln!(text, "{violation}")?;
@@ -137,35 +93,20 @@ fn only(machines: &TestMachines, arguments: &Arguments, number: u64) -> Result<S
     if record.violations.is_empty() { Ok(text) } else { Err(text.trim_end().into()) }
 }
 
-fn text(machines: &TestMachines, options: &StressOptions, summary: &StressSummary) -> String {
-    let mut text = String::new();
-    for (kind, count) in &summary.kinds {
-        text.push_str(&format!("{}: {count}\n", kind.name()));
-    }
-    for (variant, count) in machines.variants().iter().zip(&summary.variants) {
-        text.push_str(&format!("{}, {}: {count}\n", variant.machine, variant.controllers));
-    }
-    let StressSummary { run, time, ticks, loaded, limited, axes, bounded, .. } = summary;
-    let rows = [
-        ("seed", options.seed.to_string()),
-        ("trajectories", run.to_string()),
-        ("simulated time", format!("{time:.1} s, {ticks} axis ticks")),
-        ("with a load", loaded.to_string()),
-        ("reached a limit", limited.to_string()),
-        ("axes with an error bound", format!("{bounded} of {axes}")),
-        ("largest error / bound", worst(summary.error)),
-        ("largest difference from the linear loop / allowed rounding error", worst(summary.mismatch)),
-        ("largest energy imbalance of a tick / allowed rounding error", worst(summary.imbalance)),
-        ("energy supplied, without copper losses", format!("{:.1} J", summary.supplied)),
-        ("dissipated by friction", format!("{:.1} J", summary.dissipated)),
-        ("returned by friction at standstill", format!("{:.6} J", summary.returned)),
-        ("trajectories with violations", summary.violating.to_string()),
-        ("digest", summary.digest()),
-    ];
-    for (name, value) in rows {
-        text.push_str(&format!("{name}: {value}\n"));
-    }
-    text
+fn text(summary: &StressSummary) -> String {
+    let StressSummary { run, ticks, bounded, axes, .. } = summary;
+    format!(
+        "{run} trajectories without violation, {ticks} ticks of axes\n\
+         axes with an error bound: {bounded} of {axes}\n\
+         largest error / bound: {}\n\
+         largest difference from the linear loop / allowed rounding error: {}\n\
+         largest energy imbalance of a tick / allowed rounding error: {}\n\
+         digest: {}\n",
+        worst(summary.error),
+        worst(summary.mismatch),
+        worst(summary.imbalance),
+        summary.digest()
+    )
 }
 
 fn worst((value, number): (f64, u64)) -> String {
@@ -177,7 +118,7 @@ fn object(machines: &TestMachines, options: &StressOptions, summary: &StressSumm
     let variants = machines.variants().iter().zip(&summary.variants).map(|(variant, count)| {
         json!({ "machine": variant.machine, "controllers": variant.controllers, "trajectories": count })
     });
-    let kinds = summary.kinds.iter().map(|(kind, count)| (kind.name().to_owned(), json!(count)));
+    let kinds = summary.kinds.iter().map(|(kind, count)| (kind.to_string(), json!(count)));
     json!({
         "seed": options.seed,
         "first": options.first,

@@ -11,8 +11,7 @@ use virtual_axes_core::units::{
     METER_PER_MINUTE, MICROSECOND_NS, MILLIMETER, MILLISECOND_NS, Nanoseconds, POSITION_GAIN,
 };
 
-use super::hidden_axis::AxisOrientation;
-use crate::stress::random::RandomSource;
+use crate::random::RandomSource;
 
 /// Screw leads, mm.
 const LEADS: [f64; 7] = [10.0, 12.0, 16.0, 20.0, 25.0, 30.0, 40.0];
@@ -32,6 +31,15 @@ const ELECTRICAL_TIME: f64 = 0.015;
 const MAX_INDUCTANCE: f64 = 8.5e-3;
 /// Travel limit in both directions, m.
 const TRAVEL: f64 = 1.0;
+
+/// Orientation of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AxisOrientation {
+    /// Horizontal axis without weight.
+    Horizontal,
+    /// Vertical axis with a weight of 3000 to 6000 N.
+    Vertical,
+}
 
 /// Draws the periods of a control: Tsp of 1, 2 or 6 ms with usual velocity and current cycles.
 pub(super) fn draw_periods(random: &mut RandomSource) -> Periods {

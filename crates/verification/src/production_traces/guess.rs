@@ -8,8 +8,8 @@ use virtual_axes_core::config::{
 use virtual_axes_core::units::{MICROSECOND_NS, MILLISECOND_NS, Nanoseconds, POSITION_GAIN};
 
 use super::drawn::EMF_RATIO;
-use super::hidden_axis::{HiddenAxis, stream};
-use crate::stress::random::RandomSource;
+use super::hidden_axis::HiddenAxis;
+use crate::random::{RandomSource, stream};
 
 /// Largest relative error of inertia and torque constant.
 const ERROR: f64 = 0.4;

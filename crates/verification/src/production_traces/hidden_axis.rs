@@ -1,46 +1,16 @@
 //! Axis with hidden random parameters, and its simulation.
 
+use std::error::Error;
 use std::sync::Arc;
 
 use virtual_axes_core::config::{AxisConfig, LimitsConfig, MachineConfig, Periods};
 use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters};
 use virtual_axes_core::units::{METER_PER_MINUTE, Nanoseconds, seconds};
 
-use super::drawn::{draw_axis, draw_periods};
-use super::error::TraceError;
-use super::program::ProductionProgram;
+use super::drawn::{AxisOrientation, draw_axis, draw_periods};
+use super::program::{JOINT_NAMES, ProductionProgram};
 use crate::fixtures::recordings::stribeck_current;
-use crate::stress::random::RandomSource;
-
-/// Numbers of the random streams of a seed.
-pub(super) mod stream {
-    /// Periods of a machine.
-    pub const PERIODS: u64 = 1;
-    /// Knowledge of the periods.
-    pub const PERIOD_KNOWLEDGE: u64 = 2;
-    /// Moves of a program.
-    pub const PROGRAM: u64 = 3;
-    /// Stamps and gaps of a trace, common to its axes.
-    pub const STAMPS: u64 = 4;
-    /// Parameters of an axis, plus its joint index.
-    pub const AXIS: u64 = 100;
-    /// Guess of an axis, plus its joint index.
-    pub const GUESS: u64 = 200;
-    /// Noise of an axis, plus its joint index.
-    pub const NOISE: u64 = 300;
-}
-
-/// Names of the joints of a [`ProductionProgram`].
-pub(super) const JOINT_NAMES: [&str; 3] = ["x", "y", "z"];
-
-/// Orientation of an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AxisOrientation {
-    /// Horizontal axis without weight.
-    Horizontal,
-    /// Vertical axis with a weight of 3000 to 6000 N.
-    Vertical,
-}
+use crate::random::{RandomSource, stream};
 
 /// Axis with parameters that an identification must find.
 ///
@@ -69,10 +39,33 @@ pub struct SimulatedAxis {
     pub period: f64,
     /// Samples of the motor side, one per period, from the start of the program.
     pub samples: Vec<AxisSample>,
-    /// Mean current over one period around each sample, A.
-    pub mean_current: Vec<f64>,
-    /// Part of the position cycles with speed, current or voltage setpoint at its limit, 0 … 1.
-    pub saturated: f64,
+    /// Current at every tick, A.
+    pub currents: Vec<f64>,
+    /// Ticks per sample.
+    pub ticks_per_sample: usize,
+}
+
+impl SimulatedAxis {
+    /// Returns the mean current over one period around each sample, A.
+    pub fn mean_currents(&self) -> Vec<f64> {
+        let (every, count) = (self.ticks_per_sample, self.currents.len());
+        let mean = |k: usize| {
+            let range = (k * every).saturating_sub(every / 2)..(k * every + every.div_ceil(2)).min(count);
+            let values = self.currents.get(range).unwrap_or_default();
+            values.iter().sum::<f64>() / values.len() as f64
+        };
+        (0..self.samples.len()).map(mean).collect()
+    }
+
+    /// Returns the current at `phase` of the period behind each sample, 0 … 1, A.
+    pub fn currents_at(&self, phase: f64) -> Vec<f64> {
+        let every = self.ticks_per_sample;
+        let offset = (phase.clamp(0.0, 1.0) * every as f64) as usize;
+        let last = self.currents.last().copied().unwrap_or(0.0);
+        (0..self.samples.len())
+            .map(|k| self.currents.get(k * every + offset).copied().unwrap_or(last))
+            .collect()
+    }
 }
 
 impl HiddenAxis {
@@ -103,8 +96,8 @@ impl HiddenAxis {
     /// Plans program `seed` of up to `duration` s within the limits of this axis.
     ///
     /// # Errors
-    /// [`TraceError`] if the duration is out of range or the program cannot be planned.
-    pub fn program(&self, seed: u64, duration: f64) -> Result<ProductionProgram, TraceError> {
+    /// An error if the duration is out of range or the program cannot be planned.
+    pub fn program(&self, seed: u64, duration: f64) -> Result<ProductionProgram, Box<dyn Error>> {
         let limits: [LimitsConfig; 3] = [*self.config.limits(); 3];
         ProductionProgram::draw(seed, duration, &limits)
     }
@@ -117,23 +110,22 @@ impl HiddenAxis {
         seconds(cycles as Nanoseconds * self.periods.position)
     }
 
-    /// Simulates the axis on a program with one sample every `period` ns, or every position cycle if Tsp is longer.
+    /// Simulates the axis on a program with one sample every `period` ns, rounded to current cycles.
     ///
     /// # Errors
-    /// [`TraceError::Machine`] if the axis cannot be simulated.
+    /// An error if the axis cannot be simulated.
     pub fn simulate(
         &self,
         program: &ProductionProgram,
         period: Nanoseconds,
-    ) -> Result<SimulatedAxis, TraceError> {
+    ) -> Result<SimulatedAxis, Box<dyn Error>> {
         let mut machine = Machine::new(Arc::new(MachineParameters::new(&self.machine())?));
         let tsp = seconds(self.periods.position);
         machine.reset(&[program.psec(self.joint, 0.0)]);
-        let sampling = period.max(self.periods.position);
-        let every = (sampling / self.periods.current).max(1) as u64;
+        let every = (period / self.periods.current).max(1) as u64;
         let force_constant = self.config.motor.torque_constant / self.config.transmission_ratio;
         let cycles = (program.duration() / tsp).floor() as u64;
-        let (mut samples, mut mean_current, mut saturated) = (Vec::new(), PeriodMeans::new(every), 0_u64);
+        let (mut samples, mut currents) = (Vec::new(), Vec::new());
         for k in 0..=cycles {
             if self.stribeck != 0.0 {
                 let velocity = machine.axis(0).sample().velocity / METER_PER_MINUTE;
@@ -141,59 +133,55 @@ impl HiddenAxis {
             }
             machine.advance_with(&[program.psec(self.joint, k as f64 * tsp)], &[], |machine| {
                 let sample = machine.axis(0).sample();
-                mean_current.push(machine.tick(), sample.current);
+                currents.push(sample.current);
                 if machine.tick().is_multiple_of(every) {
                     samples.push(*sample);
                 }
             });
-            saturated += u64::from(machine.activity(0).saturated_ticks > 0);
         }
-        let saturated = saturated as f64 / (cycles + 1) as f64;
-        let mut mean_current = mean_current.values();
-        mean_current.truncate(samples.len());
-        Ok(SimulatedAxis { period: seconds(sampling), samples, mean_current, saturated })
+        let period = seconds(every as Nanoseconds * self.periods.current);
+        Ok(SimulatedAxis { period, samples, currents, ticks_per_sample: every as usize })
     }
 }
 
-/// Means of a signal over periods of `every` ticks, each centered at a multiple of `every`.
-struct PeriodMeans {
-    every: u64,
-    /// Sum and number of values per period.
-    sums: Vec<(f64, u64)>,
+/// Machine with hidden axes and one control.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HiddenMachine {
+    /// Axes in the order of joints, with equal periods.
+    pub axes: Vec<HiddenAxis>,
 }
 
-impl PeriodMeans {
-    fn new(every: u64) -> Self {
-        PeriodMeans { every, sums: Vec::new() }
+impl HiddenMachine {
+    /// Draws the axes X, Y (horizontal) and Z (vertical) of a machine. Each axis is that of [`HiddenAxis::draw`] with
+    /// equal seed.
+    pub fn draw(seed: u64) -> Self {
+        HiddenMachine { axes: (0..3).map(|joint| HiddenAxis::draw_joint(seed, joint)).collect() }
     }
 
-    /// Adds the value at `tick`; ticks ascend by one from 0.
-    fn push(&mut self, tick: u64, value: f64) {
-        if tick == 0 || (tick + self.every / 2).is_multiple_of(self.every) {
-            self.sums.push((0.0, 0));
+    /// Plans program `seed` of up to `duration` s within the limits of the axes.
+    ///
+    /// # Errors
+    /// An error if the duration is out of range or the program cannot be planned.
+    pub fn program(&self, seed: u64, duration: f64) -> Result<ProductionProgram, Box<dyn Error>> {
+        ProductionProgram::draw(seed, duration, &self.limits())
+    }
+
+    /// Plans program `seed` of `count` rapids of all axes.
+    ///
+    /// # Errors
+    /// An error if the program cannot be planned.
+    pub fn rapids(&self, seed: u64, count: usize) -> Result<ProductionProgram, Box<dyn Error>> {
+        ProductionProgram::draw_rapids(seed, count, &self.limits())
+    }
+
+    fn limits(&self) -> [LimitsConfig; 3] {
+        let fallback = HiddenAxis::draw_joint(0, 0).config.limits;
+        let mut limits = [self.axes.first().map_or(fallback, |axis| axis.config.limits); 3];
+        for axis in &self.axes {
+            if let Some(limits) = limits.get_mut(axis.joint) {
+                *limits = axis.config.limits;
+            }
         }
-        if let Some((sum, count)) = self.sums.last_mut() {
-            *sum += value;
-            *count += 1;
-        }
-    }
-
-    fn values(self) -> Vec<f64> {
-        self.sums.into_iter().map(|(sum, count)| sum / count as f64).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::PeriodMeans;
-
-    #[test]
-    fn means_are_centered_at_the_samples() {
-        let mut means = PeriodMeans::new(4);
-        (0..10).for_each(|tick| means.push(tick, tick as f64));
-        assert_eq!(means.values(), [0.5, 3.5, 7.5]);
-        let mut means = PeriodMeans::new(1);
-        (0..3).for_each(|tick| means.push(tick, tick as f64));
-        assert_eq!(means.values(), [0.0, 1.0, 2.0]);
+        limits
     }
 }

@@ -8,8 +8,10 @@
 //! - [`HiddenAxis`] is an axis with random parameters, [`HiddenMachine`] a machine of such axes.
 //! - [`ProductionProgram`] is a random part program for three linear axes; several programs can run on one axis.
 //! - [`TraceRecorder`] sets filter, sampling, quantization, noise, gaps and jitter of [`HiddenAxis::record`].
+//! - [`TraceKind`] is a random program, recorder and feedforward, at sampling periods from 0.5 to 20 ms.
+//! - [`study`] identifies an axis from such a recording and compares the result with the hidden parameters.
 //! - [`AxisGuess`] contains what a user knows about a hidden axis.
-//! - [`write_csv`], [`machine_file()`] and [`truth_file`] write traces and parameters.
+//! - [`write_csv`] and [`machine_file()`] write traces and parameters.
 //!
 //! Every random number derives from a seed: equal seeds give bit-identical traces on one machine.
 //!
@@ -29,27 +31,22 @@
 //! # }
 //! ```
 
-mod butterworth;
-mod csv;
 mod drawn;
-mod error;
 mod guess;
 mod hidden_axis;
-mod hidden_machine;
-mod machine_file;
-mod position_error;
 mod program;
 mod recorder;
 mod study;
+mod study_table;
+mod trace_files;
+mod trace_kind;
 
-pub use butterworth::ButterworthFilter;
-pub use csv::write_csv;
-pub use error::TraceError;
+pub use drawn::AxisOrientation;
 pub use guess::AxisGuess;
-pub use hidden_axis::{AxisOrientation, HiddenAxis, SimulatedAxis};
-pub use hidden_machine::HiddenMachine;
-pub use machine_file::{machine_file, truth_file};
-pub use position_error::PositionError;
+pub use hidden_axis::{HiddenAxis, HiddenMachine, SimulatedAxis};
 pub use program::ProductionProgram;
 pub use recorder::{CurrentSampling, TraceRecorder};
-pub use study::{StudyCase, StudyFigures, TraceStudy};
+pub use study::{StudyFigures, study};
+pub use study_table::study_table;
+pub use trace_files::{machine_file, write_csv};
+pub use trace_kind::{PERIODS, TraceKind, TraceProgram};

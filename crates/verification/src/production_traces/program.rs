@@ -1,6 +1,8 @@
 //! Random part programs for three linear axes.
 
+use std::error::Error;
 use std::f64::consts::{FRAC_PI_2, TAU};
+use std::ops::RangeInclusive;
 
 use virtual_axes_core::config::{AxisKind, LimitsConfig, Parameters, Value, ValueSource};
 use virtual_axes_core::kinematics::Kinematics;
@@ -8,16 +10,16 @@ use virtual_axes_core::path::{Block, Frame, Move, PathError, PlanError, Program}
 use virtual_axes_core::trajectory::JointLimits;
 use virtual_axes_core::units::{METER_PER_MINUTE, MILLISECOND_NS};
 
-use super::error::TraceError;
-use super::hidden_axis::{JOINT_NAMES, stream};
-use crate::stress::random::RandomSource;
+use crate::random::{RandomSource, stream};
 
+/// Names of the joints of a program.
+pub(super) const JOINT_NAMES: [&str; 3] = ["x", "y", "z"];
 const X: usize = 0;
 const Y: usize = 1;
 const Z: usize = 2;
 const KINDS: [AxisKind; 3] = [AxisKind::Linear; 3];
 /// Range of the duration of a program, s.
-pub(super) const DURATION: [f64; 2] = [3.0, 60.0];
+const DURATION: RangeInclusive<f64> = 3.0..=60.0;
 /// Period of the setpoints that satisfy the limits; Tsp is a multiple of it.
 const PLANNING_PERIOD: i64 = MILLISECOND_NS;
 /// Rest before the first move, s.
@@ -39,11 +41,34 @@ impl ProductionProgram {
     /// Draws program `seed` for axes X, Y, Z with `limits`, cut off after `duration` s, 3 to 60 s.
     ///
     /// # Errors
-    /// [`TraceError`] if the duration is out of range or the program cannot be planned.
-    pub fn draw(seed: u64, duration: f64, limits: &[LimitsConfig; 3]) -> Result<Self, TraceError> {
-        TraceError::check_range("the duration in s", duration, DURATION, "from 3 to 60")?;
-        let mut moves = ProgramDraft::new(seed, limits);
-        moves.draw(duration).map_err(PlanError::from)?;
+    /// An error if the duration is out of range or the program cannot be planned.
+    pub fn draw(seed: u64, duration: f64, limits: &[LimitsConfig; 3]) -> Result<Self, Box<dyn Error>> {
+        if !DURATION.contains(&duration) {
+            return Err(format!("the duration is {duration} s, must be from 3 to 60").into());
+        }
+        let mut draft = ProgramDraft::new(seed, limits);
+        draft.draw(duration).map_err(PlanError::from)?;
+        let mut program = Self::plan(draft, limits)?;
+        program.duration = program.duration.min(duration);
+        Ok(program)
+    }
+
+    /// Draws program `seed` of `count` rapids of all axes, 20 to 200 mm long, in alternating directions, each with a dwell.
+    ///
+    /// # Errors
+    /// An error if the program cannot be planned.
+    pub fn draw_rapids(seed: u64, count: usize, limits: &[LimitsConfig; 3]) -> Result<Self, Box<dyn Error>> {
+        let mut draft = ProgramDraft::new(seed, limits);
+        for k in 0..count {
+            let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+            let step = draft.direction.map(|direction| sign * direction * draft.random.between(0.02, 0.2));
+            draft.rapid_by(step).map_err(PlanError::from)?;
+            draft.dwell(0.2, 0.5);
+        }
+        Self::plan(draft, limits)
+    }
+
+    fn plan(draft: ProgramDraft, limits: &[LimitsConfig; 3]) -> Result<Self, Box<dyn Error>> {
         let names = JOINT_NAMES.map(str::to_owned).to_vec();
         let mut parameters = Parameters::embedded_default()?;
         parameters.set("joints", Value::TextList(names), &ValueSource::named("program"))?;
@@ -54,8 +79,8 @@ impl ProductionProgram {
             limits: *limits,
         };
         let joints: Vec<JointLimits> = JOINT_NAMES.into_iter().zip(limits).map(joint).collect();
-        let program = Program::plan(kinematics, Frame::Joints, &joints, PLANNING_PERIOD, REST, moves.moves)?;
-        Ok(ProductionProgram { duration: duration.min(program.duration()), program })
+        let program = Program::plan(kinematics, Frame::Joints, &joints, PLANNING_PERIOD, REST, draft.moves)?;
+        Ok(ProductionProgram { duration: program.duration(), program })
     }
 
     /// Returns the duration, s.

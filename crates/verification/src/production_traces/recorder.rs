@@ -1,51 +1,57 @@
 //! Trace function of a control: sampling, filter, quantization, noise, gaps and stamps.
 
+use std::error::Error;
+use std::f64::consts::{PI, SQRT_2};
+
 use virtual_axes_core::machine::AxisSample;
-use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, SECOND_NS, seconds};
+use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, seconds};
 use virtual_axes_identify::recording::RawRecording;
 
-use super::butterworth::ButterworthFilter;
-use super::error::TraceError;
-use super::hidden_axis::{HiddenAxis, SimulatedAxis, stream};
+use super::hidden_axis::{HiddenAxis, HiddenMachine, SimulatedAxis};
 use super::program::ProductionProgram;
 use crate::fixtures::recordings::NoiseGenerator;
-use crate::stress::random::RandomSource;
+use crate::random::{RandomSource, stream};
 
 /// Longest gap, samples.
 const MAX_GAP: usize = 15;
 /// Largest number of gaps.
 const MAX_GAPS: usize = 3;
 
-/// Sampling of the current in the control.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Way in which a control samples the current.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CurrentSampling {
-    /// Mean over one sampling period around the instant, as a drive smooths its actual current.
+    /// Mean over the sampling period around each sample.
     Mean,
-    /// Current at the instant. VFFWS and TFFWS step once per position cycle, and the current follows in a sawtooth,
-    /// of which this sampling always meets the same phase: with Tsp = 6 ms the recorded current of an acceleration is
-    /// 0.3 to 1.5 times its mean.
-    Instant,
+    /// Value at this phase of the sampling period behind each sample, 0 … 1.
+    Instant(f64),
 }
 
 /// Trace function of a control; the default is that of a machining center in production.
 ///
-/// The signals are sampled every `sampling_period`, or at each position cycle if Tsp is longer, and held in between;
-/// the current is averaged before.
-/// Then one [`ButterworthFilter`] filters all of them, the commanded position included, so that their relative lags
+/// The signals are sampled every `sampling_period`, or at each position cycle if Tsp is longer, and held in between.
+/// Then one Butterworth filter filters all of them, the commanded position included, so that their relative lags
 /// remain. Of the filtered signals one sample per `period` is stored; noise and quantization follow.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceRecorder {
     /// Period of sampling in the control, ns.
     pub sampling_period: Nanoseconds,
+    /// True if a shorter `sampling_period` samples within the position cycle too, as the trace of a drive does.
+    pub is_within_cycles: bool,
     /// Sampling of the current.
     pub current_sampling: CurrentSampling,
+    /// Number of sampling periods by which actual position, velocity and current are logged too late.
+    pub delay: usize,
+    /// True if VFFWS and TFFWS are recorded.
+    pub is_feedforward_recorded: bool,
     /// Half-power frequency of the filter, Hz; 0 disables it.
     pub cutoff: f64,
     /// Period of stored samples, ns, a multiple of `sampling_period`.
     pub period: Nanoseconds,
     /// Time of the program before the recording, s.
     pub start: f64,
-    /// Resolution of positions, m; 0 for none.
+    /// Resolution of the commanded position, m; 0 for none.
+    pub psec_resolution: f64,
+    /// Resolution of the actual position, m; 0 for none.
     pub position_resolution: f64,
     /// Resolution of the current, A; 0 for none.
     pub current_resolution: f64,
@@ -66,10 +72,14 @@ impl Default for TraceRecorder {
     fn default() -> Self {
         TraceRecorder {
             sampling_period: 2 * MILLISECOND_NS,
+            is_within_cycles: false,
             current_sampling: CurrentSampling::Mean,
+            delay: 0,
+            is_feedforward_recorded: false,
             cutoff: 24.0,
             period: 20 * MILLISECOND_NS,
             start: 0.0,
+            psec_resolution: 1e-7,
             position_resolution: 1e-7,
             current_resolution: 0.01,
             position_noise: 2e-7,
@@ -85,6 +95,7 @@ impl TraceRecorder {
     /// Returns the default without noise, quantization, gaps and jitter.
     pub fn ideal() -> Self {
         TraceRecorder {
+            psec_resolution: 0.0,
             position_resolution: 0.0,
             current_resolution: 0.0,
             position_noise: 0.0,
@@ -96,38 +107,11 @@ impl TraceRecorder {
         }
     }
 
-    fn check(&self) -> Result<(), TraceError> {
-        let sampling_ms = self.sampling_period as f64 / MILLISECOND_NS as f64;
-        let nyquist = 0.5 * SECOND_NS as f64 / self.sampling_period.max(1) as f64;
-        TraceError::check_range("the sampling period in ms", sampling_ms, [0.5, 20.0], "from 0.5 to 20")?;
-        let rate = (self.period.max(0) / self.sampling_period) as f64;
-        TraceError::check_range("the period in sampling periods", rate, [1.0, 1000.0], "from 1 to 1000")?;
-        TraceError::check_range(
-            "the cutoff in Hz",
-            self.cutoff,
-            [0.0, 0.9 * nyquist],
-            "0 or below 0.45 times the sampling frequency",
-        )?;
-        let deviations = [
-            ("start in s", self.start),
-            ("the position resolution in m", self.position_resolution),
-            ("the current resolution in A", self.current_resolution),
-            ("the position noise in m", self.position_noise),
-            ("the velocity noise in m/s", self.velocity_noise),
-            ("the relative current noise", self.current_noise),
-            ("the jitter in s", self.jitter),
-        ];
-        for (name, found) in deviations {
-            TraceError::check_range(name, found, [0.0, f64::MAX], "finite and at least 0")?;
-        }
-        TraceError::check_range("the gap probability", self.gap_probability, [0.0, 1.0], "from 0 to 1")
-    }
-
-    /// Returns the filtered values of a channel at the sampling instants, zero-order held.
-    fn filtered(&self, simulated: &SimulatedAxis, values: &[f64]) -> Vec<f64> {
+    /// Returns the filtered values of a channel at the sampling instants, zero-order held, `delay` sampling periods late.
+    fn filtered(&self, simulated: &SimulatedAxis, values: &[f64], delay: usize) -> Vec<f64> {
         let period = seconds(self.sampling_period);
         let count = (values.len() as f64 * simulated.period / period).round() as usize;
-        let index = |k: usize| ((k as f64 * period + 1e-9) / simulated.period) as usize;
+        let index = |k: usize| ((k.saturating_sub(delay) as f64 * period + 1e-9) / simulated.period) as usize;
         let held: Vec<f64> = (0..count).filter_map(|k| values.get(index(k)).copied()).collect();
         if self.cutoff > 0.0 { ButterworthFilter::new(self.cutoff, period).filter(&held) } else { held }
     }
@@ -175,36 +159,47 @@ fn quantized(value: f64, step: f64) -> f64 {
 
 impl HiddenAxis {
     /// Records a program in SI units, with the name of the axis as name of the recording. PSEC is the commanded
-    /// position before the delay α; VFFWS and TFFWS are not recorded.
+    /// position before the delay α, VFFWS and TFFWS are those behind β and γ.
     ///
     /// Stamps and gaps depend on `recorder` and `seed` only, noise on the joint too.
     ///
     /// # Errors
-    /// [`TraceError`] if an option of the recorder is out of range or the axis cannot be simulated.
+    /// An error if the axis cannot be simulated.
     pub fn record(
         &self,
         program: &ProductionProgram,
         recorder: &TraceRecorder,
         seed: u64,
-    ) -> Result<RawRecording, TraceError> {
-        recorder.check()?;
-        let simulated = self.simulate(program, recorder.sampling_period)?;
-        let channel = |of: fn(&AxisSample) -> f64| -> Vec<f64> {
+    ) -> Result<RawRecording, Box<dyn Error>> {
+        let sampling = match recorder.is_within_cycles {
+            true => recorder.sampling_period,
+            false => recorder.sampling_period.max(self.periods.position),
+        };
+        let simulated = self.simulate(program, sampling)?;
+        let setpoint = |of: fn(&AxisSample) -> f64| -> Vec<f64> {
             let values: Vec<f64> = simulated.samples.iter().map(of).collect();
-            recorder.filtered(&simulated, &values)
+            recorder.filtered(&simulated, &values, 0)
         };
-        let psec = channel(|sample| sample.psec);
-        let position = recorder.filtered(&simulated, &self.load_position(&simulated));
-        let velocity = channel(|sample| sample.velocity);
+        let measured = |values: &[f64]| recorder.filtered(&simulated, values, recorder.delay);
+        let psec = setpoint(|sample| sample.psec);
+        let position = measured(&self.load_position(&simulated));
+        let velocity: Vec<f64> = simulated.samples.iter().map(|sample| sample.velocity).collect();
+        let velocity = measured(&velocity);
         let sign = if self.is_current_inverted { -1.0 } else { 1.0 };
-        let current = match recorder.current_sampling {
-            CurrentSampling::Mean => recorder.filtered(&simulated, &simulated.mean_current),
-            CurrentSampling::Instant => channel(|sample| sample.current),
-        };
+        let current = measured(&match recorder.current_sampling {
+            CurrentSampling::Mean => simulated.mean_currents(),
+            CurrentSampling::Instant(phase) => simulated.currents_at(phase),
+        });
         let stored = recorder.stored_samples(psec.len(), seed);
         let at = |values: &[f64]| -> Vec<f64> {
             stored.instants.iter().filter_map(|&instant| values.get(instant).copied()).collect()
         };
+        let feedforward =
+            |of: fn(&AxisSample) -> f64| recorder.is_feedforward_recorded.then(|| at(&setpoint(of)));
+        let (velocity_feedforward, torque_feedforward) = (
+            feedforward(|sample| sample.velocity_feedforward),
+            feedforward(|sample| sample.torque_feedforward),
+        );
         let mut noise =
             NoiseGenerator::new(seed.wrapping_mul(1000).wrapping_add(stream::NOISE + self.joint as u64));
         let mut noisy = |values: &[f64], deviation: f64, step: f64| -> Vec<f64> {
@@ -213,15 +208,17 @@ impl HiddenAxis {
         };
         let largest = current.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
         let current: Vec<f64> = current.iter().map(|value| sign * value).collect();
-        let resolution = recorder.position_resolution;
         Ok(RawRecording {
             name: self.config.name.clone(),
-            psec: Some(at(&psec).into_iter().map(|value| quantized(value, resolution)).collect()),
-            position: Some(noisy(&position, recorder.position_noise, resolution)),
+            psec: Some(
+                at(&psec).into_iter().map(|value| quantized(value, recorder.psec_resolution)).collect(),
+            ),
+            position: Some(noisy(&position, recorder.position_noise, recorder.position_resolution)),
             velocity: Some(noisy(&velocity, recorder.velocity_noise, 0.0)),
             current: Some(noisy(&current, recorder.current_noise * largest, recorder.current_resolution)),
-            velocity_feedforward: None,
-            torque_feedforward: None,
+            torque: None,
+            velocity_feedforward,
+            torque_feedforward,
             motor_position: None,
             time: stored.stamps,
         })
@@ -236,5 +233,63 @@ impl HiddenAxis {
             load
         };
         simulated.samples.iter().map(follow).collect()
+    }
+}
+
+impl HiddenMachine {
+    /// Records a program: one recording per axis, with equal stamps.
+    ///
+    /// # Errors
+    /// An error if an option of the recorder is out of range or an axis cannot be simulated.
+    pub fn record(
+        &self,
+        program: &ProductionProgram,
+        recorder: &TraceRecorder,
+        seed: u64,
+    ) -> Result<Vec<RawRecording>, Box<dyn Error>> {
+        self.axes.iter().map(|axis| axis.record(program, recorder, seed)).collect()
+    }
+}
+
+/// Causal Butterworth low-pass filter of second order (bilinear transform with prewarped cutoff frequency).
+///
+/// The gain is 1 at rest and 1/√2 at the cutoff frequency. Well below it the filter delays every signal by
+/// √2 / (2π · cutoff): 9.4 ms at 24 Hz. Signals filtered alike keep their lags relative to each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ButterworthFilter {
+    /// Coefficients of input values k, k − 1, k − 2.
+    input: [f64; 3],
+    /// Coefficients of output values k − 1, k − 2.
+    output: [f64; 2],
+}
+
+impl ButterworthFilter {
+    /// Creates a filter for samples every `period` s with the half-power frequency `cutoff` in Hz, below half of the
+    /// sampling frequency.
+    fn new(cutoff: f64, period: f64) -> Self {
+        let k = (PI * cutoff * period).tan();
+        let scale = 1.0 / (1.0 + SQRT_2 * k + k * k);
+        let gain = k * k * scale;
+        ButterworthFilter {
+            input: [gain, 2.0 * gain, gain],
+            output: [2.0 * (k * k - 1.0) * scale, (1.0 - SQRT_2 * k + k * k) * scale],
+        }
+    }
+
+    /// Returns the filtered values, one per value of `values`, in their unit. Before the first value the signal has
+    /// its first value.
+    fn filter(&self, values: &[f64]) -> Vec<f64> {
+        let first = values.first().copied().unwrap_or(0.0);
+        // Values relative to the first keep the resolution of small changes.
+        let (mut x1, mut x2, mut y1, mut y2) = (0.0, 0.0, 0.0, 0.0);
+        let step = |value: &f64| {
+            let x = value - first;
+            let [b0, b1, b2] = self.input;
+            let [a1, a2] = self.output;
+            let y = b0 * x + b1 * x1 + b2 * x2 - a1 * y1 - a2 * y2;
+            (x2, x1, y2, y1) = (x1, x, y1, y);
+            first + y
+        };
+        values.iter().map(step).collect()
     }
 }

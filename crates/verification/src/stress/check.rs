@@ -37,28 +37,6 @@ pub enum Check {
     Accepted(RejectionCode),
 }
 
-impl Check {
-    /// Returns the description of the violation.
-    pub fn description(self) -> &'static str {
-        match self {
-            Check::Finite => "a signal is not finite",
-            Check::Limits => "a setpoint exceeds its limit",
-            Check::Reported => "the saturation flag does not match the setpoints",
-            Check::Counted => "the figures of a position cycle do not match its ticks",
-            Check::SetpointSpeed => "the position setpoint exceeds the velocity limit of the axis",
-            Check::FrictionSign => "friction acts in the direction of motion",
-            Check::FrictionLaw => "friction differs from the friction law",
-            Check::FrictionWork => "friction supplies energy",
-            Check::Position => "the position is not the integral of the speed",
-            Check::Energy => "the energy balance is violated",
-            Check::Bound => "the following error exceeds its bound",
-            Check::Superposition => "the following error differs from the linear loop",
-            Check::Ended => "a trajectory did not end exactly once",
-            Check::Accepted(_) => "a trajectory within all limits is rejected",
-        }
-    }
-}
-
 /// Violation of an invariant by a trajectory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Violation {
@@ -79,11 +57,6 @@ pub struct Violation {
 impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Violation { check, number, axis, tick, value, allowed } = self;
-        write!(
-            f,
-            "trajectory {number}, {axis}, tick {tick}: {}: {value:e}, allowed {allowed:e}",
-            check.description()
-        )?;
-        if let Check::Accepted(code) = check { write!(f, ", {}", code.name()) } else { Ok(()) }
+        write!(f, "trajectory {number}, {axis}, tick {tick}: {check:?}: {value:e}, allowed {allowed:e}")
     }
 }

@@ -1,7 +1,7 @@
 //! Random trajectory points with velocities and accelerations for cubic and quintic interpolation.
 
-use super::random::RandomSource;
 use super::shape::{MotionLimits, extent};
+use crate::random::RandomSource;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
 /// Point of one axis: displacement, velocity, acceleration.

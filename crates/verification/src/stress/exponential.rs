@@ -26,19 +26,3 @@ pub fn exponential<const N: usize>(a: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N>
     }
     sum
 }
-
-#[cfg(test)]
-mod tests {
-    use nalgebra::Matrix2;
-
-    use super::*;
-
-    #[test]
-    fn exponential_of_a_skew_matrix_is_a_rotation() {
-        for angle in [1e-3_f64, 0.7, 3.0, 20.0] {
-            let found = exponential(&Matrix2::new(0.0, -angle, angle, 0.0));
-            let turned = Matrix2::new(angle.cos(), -angle.sin(), angle.sin(), angle.cos());
-            assert!((found - turned).norm() < 1e-13, "{angle}: {found}");
-        }
-    }
-}

@@ -171,13 +171,12 @@ impl InvariantChecker {
             limited_ticks: self.limited_ticks,
             peak_current: self.peak_current,
             error: largest(&self.errors),
-            bound: None,
-            mismatch: 0.0,
             supplied: self.drive.supplied,
             dissipated: self.drive.dissipated,
             returned: self.drive.returned,
             imbalance: self.drive.imbalance,
             end: [s.position, s.velocity, s.current, s.voltage, s.current_setpoint],
+            ..AxisObservation::default()
         };
         let Some(last) = instants.checked_sub(1) else { return figures };
         let feedforward: &[f64] = if model.is_compensated { &self.feedforward } else { &[] };

@@ -1,54 +1,31 @@
 //! Random trajectory: machine variant, start, commands and loads.
 
 use super::curve::{self, CurvePoint};
-use super::random::RandomSource;
 use super::shape::{MotionLimits, extent};
 use super::test_machines::TestMachines;
+use crate::random::RandomSource;
+use virtual_axes_core::named_values;
 use virtual_axes_core::trajectory::{Rejection, Start, TrajectoryPoint, TrajectoryRequest};
 use virtual_axes_core::units::Nanoseconds;
 
-/// Kind of a random trajectory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum TrajectoryKind {
-    /// Rest-to-rest motion within velocity, acceleration and jerk limits, one setpoint per position cycle.
-    Move,
-    /// Points with velocities, interpolated by cubic polynomials.
-    Cubic,
-    /// Points with velocities and accelerations, interpolated by quintic polynomials.
-    Quintic,
-    /// Random walk within velocity and acceleration limits.
-    Walk,
-    /// Streamed setpoints with stepwise constant velocity.
-    Stream,
-    /// Random walk with a controlled stop.
-    Stop,
-    /// Standstill under loads.
-    Hold,
-}
-
-impl TrajectoryKind {
-    /// All kinds.
-    pub const ALL: [TrajectoryKind; 7] = [
-        TrajectoryKind::Move,
-        TrajectoryKind::Cubic,
-        TrajectoryKind::Quintic,
-        TrajectoryKind::Walk,
-        TrajectoryKind::Stream,
-        TrajectoryKind::Stop,
-        TrajectoryKind::Hold,
-    ];
-
-    /// Returns the name.
-    pub fn name(self) -> &'static str {
-        match self {
-            TrajectoryKind::Move => "move",
-            TrajectoryKind::Cubic => "cubic",
-            TrajectoryKind::Quintic => "quintic",
-            TrajectoryKind::Walk => "walk",
-            TrajectoryKind::Stream => "stream",
-            TrajectoryKind::Stop => "stop",
-            TrajectoryKind::Hold => "hold",
-        }
+named_values! {
+    /// Kind of a random trajectory.
+    #[derive(PartialOrd, Ord)]
+    pub enum TrajectoryKind {
+        /// Rest-to-rest motion within velocity, acceleration and jerk limits, one setpoint per position cycle.
+        Move = "move",
+        /// Points with velocities, interpolated by cubic polynomials.
+        Cubic = "cubic",
+        /// Points with velocities and accelerations, interpolated by quintic polynomials.
+        Quintic = "quintic",
+        /// Random walk within velocity and acceleration limits.
+        Walk = "walk",
+        /// Streamed setpoints with stepwise constant velocity.
+        Stream = "stream",
+        /// Random walk with a controlled stop.
+        Stop = "stop",
+        /// Standstill under loads.
+        Hold = "hold",
     }
 }
 

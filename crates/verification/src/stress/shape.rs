@@ -1,6 +1,6 @@
 //! RandomSource setpoints of one axis, within its limits by construction.
 
-use super::random::RandomSource;
+use crate::random::RandomSource;
 use virtual_axes_core::config::LimitsConfig;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
@@ -139,41 +139,4 @@ fn summed(steps: Vec<f64>) -> Vec<f64> {
             sum
         }))
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const LIMITS: LimitsConfig =
-        LimitsConfig { velocity: 0.5, acceleration: 2.5, jerk: 50.0, travel_min: -0.355, travel_max: 0.355 };
-
-    fn differences(values: &[f64], period: f64) -> Vec<f64> {
-        values.windows(2).map(|w| (w[1] - w[0]) / period).collect()
-    }
-
-    #[test]
-    fn moves_and_walks_keep_the_limits() {
-        let limits = MotionLimits::new(&LIMITS, 6_000_000, 1.0);
-        let close = 1.0 + 1e-9;
-        for number in 0..2000 {
-            let mut random = RandomSource::new(3, number);
-            let periods = 4 + random.below(40);
-            let padded = |values: Vec<f64>| {
-                let last = values[values.len() - 1];
-                [&[0.0; 3][..], &values[..], &[last; 3][..]].concat()
-            };
-            let moved = padded(limits.rest_to_rest(&mut random, periods));
-            assert!(moved.len() <= periods + 8, "{} of {periods}", moved.len());
-            let walked = padded(limits.walk(&mut random, periods));
-            for (values, jerk) in [(moved, 50.0), (walked, f64::INFINITY)] {
-                let v = differences(&values, 0.006);
-                let a = differences(&v, 0.006);
-                let j = differences(&a, 0.006);
-                assert!(v.iter().all(|v| v.abs() <= 0.5), "{number}: {v:?}");
-                assert!(a.iter().all(|a| a.abs() <= 2.5 * close), "{number}: {a:?}");
-                assert!(j.iter().all(|j| j.abs() <= jerk * close), "{number}: {j:?}");
-            }
-        }
-    }
 }

@@ -17,7 +17,7 @@ const MIN_BOUND: f64 = 1e-9;
 const MAX_VIOLATIONS: usize = 20;
 
 /// Summary of trajectories, accumulated in the order of their numbers.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct StressSummary {
     /// Number of trajectories.
     pub run: u64,
@@ -60,26 +60,7 @@ pub struct StressSummary {
 impl StressSummary {
     /// Creates an empty summary.
     pub(super) fn new(machines: &TestMachines) -> Self {
-        StressSummary {
-            run: 0,
-            kinds: BTreeMap::new(),
-            variants: vec![0; machines.variants().len()],
-            loaded: 0,
-            limited: 0,
-            time: 0.0,
-            ticks: 0,
-            axes: 0,
-            bounded: 0,
-            error: (0.0, 0),
-            mismatch: (0.0, 0),
-            imbalance: (0.0, 0),
-            supplied: 0.0,
-            dissipated: 0.0,
-            returned: 0.0,
-            violating: 0,
-            violations: Vec::new(),
-            hasher: Hasher::new(),
-        }
+        StressSummary { variants: vec![0; machines.variants().len()], ..Self::default() }
     }
 
     /// Adds the next trajectory.

@@ -1,73 +1,24 @@
 //! Machines of the stress test: each machine with every kind of controller.
 
+use std::error::Error;
 use std::sync::Arc;
 
 use super::energy::DriveEnergy;
 use super::linear_axis::LinearAxis;
 use super::response::ImpulseResponses;
 use virtual_axes_core::config::{
-    Assignment, AxisConfig, ConfigError, MachineConfig, Parameters, Value, ValueSource,
+    Assignment, AxisConfig, ControllerName, MachineConfig, Parameters, Value, ValueSource,
 };
 use virtual_axes_core::machine::MachineError;
-use virtual_axes_core::simulation::{SimulationError, joint_limits};
+use virtual_axes_core::simulation::joint_limits;
 use virtual_axes_core::trajectory::JointLimits;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
 /// Largest number of ticks of a trajectory.
 pub const MAX_TICKS: usize = 3072;
 
-/// Error in the setup of the test machines.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum TestMachinesError {
-    /// The list of machines is empty.
-    #[error("no machines are given, at least one is required")]
-    Empty,
-    /// A machine rejects the parameters of a controller.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// The controller of an axis cannot be designed.
-    #[error(transparent)]
-    Machine(#[from] MachineError),
-    /// A machine cannot be simulated.
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-    /// An axis has a property that the independent checks do not contain.
-    #[error(
-        "{machine}: axis {axis} has {property}, the checks of the stress test are those of the paper's model; \
-         remove the parameters {keys}"
-    )]
-    Extended {
-        /// Name of the machine.
-        machine: String,
-        /// Name of the axis.
-        axis: String,
-        /// Property, as a noun phrase.
-        property: &'static str,
-        /// Parameters that it comes from.
-        keys: &'static str,
-    },
-    /// Machine with axes that are coupled mechanically, which the independent checks do not contain.
-    #[error(
-        "{machine}: axes are coupled, the checks of the stress test are those of the paper's model; remove the \
-         parameters workpiece and gantry"
-    )]
-    Coupled {
-        /// Name of the machine.
-        machine: String,
-    },
-    /// The position cycle of a machine has too many ticks.
-    #[error(
-        "{machine}: a position cycle has {ticks} current cycles, at most {most} are allowed in the stress test",
-        most = MAX_TICKS / MIN_PERIODS
-    )]
-    Ticks {
-        /// Name of the machine.
-        machine: String,
-        /// Ticks of its position cycle.
-        ticks: usize,
-    },
-}
+/// Machine that cannot be tested, with the reason.
+pub type TestMachinesError = Box<dyn Error + Send + Sync>;
 
 /// Smallest number of position cycles of the longest trajectory.
 const MIN_PERIODS: usize = 32;
@@ -92,26 +43,29 @@ impl Law {
             value,
             source: ValueSource::named("stress"),
         };
-        let controller = |name: &str| set("position_loop.controller", Value::Text(name.to_owned()));
+        let controller =
+            |name: ControllerName| set("position_loop.controller", Value::Text(name.to_string()));
         let of_screw = format!("{}.feedforward.torque_kg_m2", axis.name);
         let has_screw = machine.iter().any(|(key, _)| key == of_screw);
         let torque = if has_screw { "feedforward.torque_kg_m2" } else { "feedforward.torque_kg" };
         let off = |key: &str| set(key, Value::Double(0.0));
         match self {
-            Law::Cascade => vec![controller("cascade")],
-            Law::NoFeedforward => vec![controller("cascade"), off("feedforward.velocity"), off(torque)],
-            Law::VelocityFeedforward => vec![controller("cascade"), off(torque)],
-            Law::TorqueFeedforward => vec![controller("cascade"), off("feedforward.velocity")],
-            Law::FrictionCompensation => {
-                vec![controller("cascade"), set("feedforward.friction", Value::Double(1.0))]
+            Law::Cascade => vec![controller(ControllerName::Cascade)],
+            Law::NoFeedforward => {
+                vec![controller(ControllerName::Cascade), off("feedforward.velocity"), off(torque)]
             }
-            Law::Gpc => vec![controller("gpc")],
+            Law::VelocityFeedforward => vec![controller(ControllerName::Cascade), off(torque)],
+            Law::TorqueFeedforward => vec![controller(ControllerName::Cascade), off("feedforward.velocity")],
+            Law::FrictionCompensation => {
+                vec![controller(ControllerName::Cascade), set("feedforward.friction", Value::Double(1.0))]
+            }
+            Law::Gpc => vec![controller(ControllerName::Gpc)],
             Law::Rst => {
                 // The proportional gain of the axis, spread over two cycles each of position and setpoint.
                 let gain = axis.position_loop.gain;
                 let list = |values: &[f64]| Value::DoubleList(values.to_vec());
                 vec![
-                    controller("rst"),
+                    controller(ControllerName::Rst),
                     set("position_loop.rst.r", list(&[1.2 * gain, -0.2 * gain])),
                     set("position_loop.rst.s", list(&[1.0, 0.1])),
                     set("position_loop.rst.t", list(&[0.4 * gain, 0.6 * gain])),
@@ -211,19 +165,33 @@ pub struct TestMachines {
     variants: Arc<[MachineVariant]>,
 }
 
-/// Rejects an axis with a property that the independent checks do not contain.
-fn reject_extended(machine: &str, axis: &AxisConfig) -> Result<(), TestMachinesError> {
-    let has_terms = axis.stribeck.current > 0.0 || axis.stribeck.viscous > 0.0;
-    let (property, keys) = match axis {
-        _ if axis.transmission.is_some() => {
-            ("an elastic transmission", "transmission.stiffness and transmission.load")
-        }
-        _ if axis.presliding.is_some() => ("friction with presliding", "friction.presliding"),
-        _ if has_terms => ("Stribeck or viscous friction", "friction.stribeck and friction.viscous"),
-        _ => return Ok(()),
-    };
-    let (machine, axis) = (machine.to_owned(), axis.name().to_owned());
-    Err(TestMachinesError::Extended { machine, axis, property, keys })
+/// Rejects a machine with a property that the independent checks do not contain, which are those of the paper's model.
+fn reject_extended(machine: &MachineConfig) -> Result<(), String> {
+    let reject = |what: String| Err(format!("{}: {what}", machine.name()));
+    let ticks = machine.periods().ticks_per_position() as usize;
+    let most = MAX_TICKS / MIN_PERIODS;
+    if ticks > most {
+        return reject(format!(
+            "a position cycle has {ticks} current cycles, at most {most} are allowed in the stress test"
+        ));
+    }
+    if machine.has_coupled_axes() {
+        return reject("axes are coupled; remove the parameters workpiece and gantry".to_owned());
+    }
+    for axis in machine.axes() {
+        let keys = match axis {
+            _ if axis.transmission.is_some() => "transmission.stiffness and transmission.load",
+            _ if axis.presliding.is_some() => "friction.presliding",
+            _ if axis.stribeck.current > 0.0 => "friction.stribeck",
+            _ if axis.stribeck.viscous > 0.0 => "friction.viscous",
+            _ => continue,
+        };
+        return reject(format!(
+            "axis {} is beyond the model of the paper; remove the parameters {keys}",
+            axis.name()
+        ));
+    }
+    Ok(())
 }
 
 impl TestMachines {
@@ -236,20 +204,13 @@ impl TestMachines {
         let mut variants = Vec::new();
         for machine in machines {
             let config = machine.machine_config()?;
-            let ticks = config.periods().ticks_per_position() as usize;
-            if ticks * MIN_PERIODS > MAX_TICKS {
-                return Err(TestMachinesError::Ticks { machine: config.name().to_owned(), ticks });
-            }
-            if config.has_coupled_axes() {
-                return Err(TestMachinesError::Coupled { machine: config.name().to_owned() });
-            }
-            config.axes().iter().try_for_each(|axis| reject_extended(config.name(), axis))?;
+            reject_extended(&config)?;
             for (name, laws) in VARIANTS {
                 variants.push(MachineVariant::new(machine, name, laws)?);
             }
         }
         if variants.is_empty() {
-            return Err(TestMachinesError::Empty);
+            return Err("no machines are given, at least one is required".into());
         }
         Ok(TestMachines { variants: variants.into() })
     }
@@ -259,8 +220,9 @@ impl TestMachines {
     /// # Errors
     /// [`TestMachinesError`] if a shipped machine rejects a controller, which the tests exclude.
     pub fn shipped() -> Result<Self, TestMachinesError> {
-        let machines: Result<Vec<_>, _> = Parameters::builtin_names().map(Parameters::builtin).collect();
-        Self::new(&machines?)
+        let load = |(name, text): &(&str, &str)| Parameters::from_yaml(text, name);
+        let machines = virtual_axes_builtin::MACHINES.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+        Self::new(&machines)
     }
 
     /// Returns the machine variants.

@@ -9,7 +9,7 @@ use super::drive_checker::FailedCheck;
 use super::invariants::{AxisObservation, InvariantChecker};
 use super::plan::{TestCommand, TestPlan, TrajectoryKind};
 use super::test_machines::{MachineVariant, TestMachines, TestMachinesError};
-use virtual_axes_core::machine::{AxisSample, SimdWidth};
+use virtual_axes_core::machine::SimdWidth;
 use virtual_axes_core::simulation::Simulation;
 use virtual_axes_core::trajectory::stream::STREAM_PAUSE;
 use virtual_axes_core::trajectory::{
@@ -79,22 +79,9 @@ impl TrajectoryTest {
     /// # Errors
     /// [`TestMachinesError`] if its machine cannot be simulated.
     pub fn run(&mut self, number: u64) -> Result<TestRecord, TestMachinesError> {
-        self.run_altered(number, |_, _, _| {})
-    }
-
-    /// Runs trajectory `number` and passes each sample (axis, tick, sample) to `alter` before it is checked, so that tests
-    /// can inject violations.
-    ///
-    /// # Errors
-    /// [`TestMachinesError`] if its machine cannot be simulated.
-    pub fn run_altered(
-        &mut self,
-        number: u64,
-        alter: impl FnMut(usize, usize, &mut AxisSample),
-    ) -> Result<TestRecord, TestMachinesError> {
         let mut violations = Violations { number, found: Vec::new() };
         let record = match TestPlan::new(&self.machines, self.seed, number) {
-            Ok(plan) => self.follow(&plan, &mut violations, alter)?,
+            Ok(plan) => self.follow(&plan, &mut violations)?,
             Err(rejection) => {
                 violations.add_rejection(0, &rejection);
                 TestRecord::default()
@@ -115,7 +102,6 @@ impl TrajectoryTest {
         &mut self,
         plan: &TestPlan,
         violations: &mut Violations,
-        alter: impl FnMut(usize, usize, &mut AxisSample),
     ) -> Result<TestRecord, TestMachinesError> {
         let motions = [self.next_motion(), self.next_motion()];
         let variant = &self.machines.variants()[plan.variant];
@@ -125,7 +111,7 @@ impl TrajectoryTest {
             None => CheckedSimulation::new(variant, self.width)?,
         };
         let checked = slot.insert(simulation);
-        Ok(checked.follow(plan, variant, motions, violations, alter).unwrap_or_else(|rejection| {
+        Ok(checked.follow(plan, variant, motions, violations).unwrap_or_else(|rejection| {
             let tick = checked.checkers.first().map_or(0, InvariantChecker::ticks);
             violations.add_rejection(tick, &rejection);
             TestRecord::default()
@@ -158,7 +144,6 @@ impl CheckedSimulation {
         variant: &MachineVariant,
         [motion, stop]: [MotionId; 2],
         violations: &mut Violations,
-        mut alter: impl FnMut(usize, usize, &mut AxisSample),
     ) -> Result<TestRecord, Rejection> {
         self.reset(plan, variant)?;
         let context = ValidationContext {
@@ -191,7 +176,7 @@ impl CheckedSimulation {
                 }
                 _ => {}
             }
-            let ran = self.step(variant, violations, &mut alter);
+            let ran = self.step(variant, violations);
             ends += self.simulation.drain_finished().filter(|end| end.id == motion).count();
             if ran {
                 periods += 1;
@@ -220,20 +205,13 @@ impl CheckedSimulation {
     }
 
     /// Simulates one position cycle and checks each tick. Returns false if the simulation did not advance.
-    fn step(
-        &mut self,
-        variant: &MachineVariant,
-        violations: &mut Violations,
-        alter: &mut impl FnMut(usize, usize, &mut AxisSample),
-    ) -> bool {
+    fn step(&mut self, variant: &MachineVariant, violations: &mut Violations) -> bool {
         let CheckedSimulation { simulation, checkers } = self;
         let mut tick = 0;
         simulation.step_with(|machine, _| {
             for (index, checker) in checkers.iter_mut().enumerate() {
-                let mut sample = *machine.axis(index).sample();
                 let at = checker.ticks();
-                alter(index, at, &mut sample);
-                checker.check_tick(&sample, [tick == 0, tick == 1], &mut |failed| {
+                checker.check_tick(machine.axis(index).sample(), [tick == 0, tick == 1], &mut |failed| {
                     violations.add(&variant.joints[index].name, at, failed)
                 });
             }

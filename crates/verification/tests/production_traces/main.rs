@@ -1,5 +1,5 @@
 //! Tests of the production traces.
 
-mod hidden_axes;
 mod identification;
+mod rates;
 mod traces;

@@ -1,12 +1,11 @@
-//! Random trajectories: every check passes, each check detects an injected violation, and the digest depends on the
-//! seed only.
+//! Random trajectories: every check passes, and the digest depends on the seed only.
 
 use std::process::{Command, Output};
 use std::sync::LazyLock;
 
-use virtual_axes_core::machine::{AxisSample, SimdWidth};
+use virtual_axes_core::machine::SimdWidth;
 use virtual_axes_verification::stress::{
-    Check, StressOptions, StressSummary, TestMachines, TrajectoryKind, TrajectoryTest, run,
+    StressOptions, StressSummary, TestMachines, TrajectoryKind, TrajectoryTest, run,
 };
 
 /// Number of trajectories per test.
@@ -20,7 +19,7 @@ fn options(count: u64) -> StressOptions {
 }
 
 fn stressed(options: StressOptions) -> StressSummary {
-    run(&MACHINES, &options, |_| Ok(())).expect("the stress test runs to its end")
+    run(&MACHINES, &options).expect("the stress test runs to its end")
 }
 
 #[test]
@@ -63,86 +62,6 @@ fn single_trajectory_is_bit_identical_to_the_one_of_a_series() {
     }
 }
 
-/// Asserts that `check` detects what `alter` does to the samples of one of many valid trajectories.
-#[track_caller]
-fn assert_found(check: Check, mut alter: impl FnMut(usize, usize, &mut AxisSample)) {
-    let mut test = TrajectoryTest::new(&MACHINES, 7, SimdWidth::Widest);
-    let mut found = |number: u64| {
-        let record = test.run_altered(number, &mut alter).expect("runs");
-        record.violations.iter().any(|violation| violation.check == check)
-    };
-    assert!((0..200).any(&mut found), "{check:?} is not found");
-}
-
-#[test]
-fn non_finite_signal_is_detected() {
-    assert_found(Check::Finite, |axis, tick, s| {
-        if (axis, tick) == (1, 200) {
-            s.voltage = f64::NAN
-        }
-    });
-    assert_found(Check::Energy, |axis, tick, s| {
-        if (axis, tick) == (1, 200) {
-            s.voltage = f64::NAN
-        }
-    });
-}
-
-#[test]
-fn exceeded_or_unreported_limit_is_detected() {
-    assert_found(Check::Limits, |_, tick, s| {
-        if tick == 99 {
-            s.current_setpoint = 1e3
-        }
-    });
-    assert_found(Check::Reported, |_, _, s| s.saturated = false);
-    assert_found(Check::Reported, |axis, tick, s| {
-        if (axis, tick) == (4, 150) {
-            s.saturated = true
-        }
-    });
-    assert_found(Check::Counted, |axis, tick, s| {
-        if (axis, tick) == (0, 150) {
-            s.current += 100.0
-        }
-    });
-    assert_found(Check::SetpointSpeed, |axis, tick, s| {
-        if (axis, tick) == (2, 96) {
-            s.psec += 0.1
-        }
-    });
-}
-
-#[test]
-fn driving_friction_is_detected() {
-    assert_found(Check::FrictionSign, |_, _, s| s.friction_current = -s.friction_current);
-    assert_found(Check::FrictionWork, |_, _, s| s.friction_current = -s.friction_current);
-    assert_found(Check::FrictionLaw, |_, _, s| s.friction_current *= 1.0 + 1e-9);
-}
-
-#[test]
-fn energy_imbalance_is_detected() {
-    // A part in 10¹⁰ of the speed at one tick.
-    assert_found(Check::Energy, |_, tick, s| {
-        if tick == 500 {
-            s.velocity *= 1.0 + 1e-10
-        }
-    });
-    assert_found(Check::Energy, |_, _, s| s.friction_current *= 0.999);
-    assert_found(Check::Position, |_, tick, s| {
-        if tick == 500 {
-            s.position += 1e-14
-        }
-    });
-}
-
-#[test]
-fn following_error_off_the_linear_model_is_detected() {
-    // A nanometer.
-    assert_found(Check::Superposition, |_, _, s| s.delayed_psec += 1e-9);
-    assert_found(Check::Bound, |_, _, s| s.delayed_psec += 0.1);
-}
-
 fn command(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_virtual_axes_stress")).args(arguments).output().expect("it starts")
 }
@@ -164,13 +83,7 @@ fn command_runs_many_trajectories_and_prints_one() {
 
 #[test]
 fn options_out_of_range_are_rejected_by_name() {
-    for [name, number] in [
-        ["--count", "0"],
-        ["--first", "18446744073709551615"],
-        ["--threads", "0"],
-        ["--threads", "1025"],
-        ["--seed", "-1"],
-    ] {
+    for [name, number] in [["--count", "0"], ["--first", "18446744073709551615"], ["--threads", "1025"]] {
         let output = command(&[name, number]);
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{message}");

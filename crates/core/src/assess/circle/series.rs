@@ -1,9 +1,13 @@
-//! Sums, extremes and bins over series of points of a circle, in groups of as many points as a vector has lanes.
+//! Sums over points of a circle in lanes, and bins of the polar angle.
 
 use std::f64::consts::{PI, TAU};
 
-use super::{BINS, CircleAssessor, Sums, bin_of};
-use crate::simd::{LANES, SliceOperation};
+use nalgebra::{Matrix3, Vector2, Vector3};
+
+use crate::simd::LANES;
+
+/// Number of bins of the polar angle: a tenth of a degree each.
+pub(super) const BINS: usize = 3600;
 
 /// Number of sums of a [`LaneSums`].
 const TERMS: usize = 10;
@@ -12,10 +16,10 @@ const TERMS: usize = 10;
 /// how the points are divided into series.
 #[derive(Debug, Clone, Default)]
 pub(super) struct LaneSums {
-    count: usize,
+    pub count: usize,
     /// Number, modulo [`LANES`], of the points of the first part.
     first: usize,
-    parts: [[f64; LANES]; TERMS],
+    pub parts: [[f64; LANES]; TERMS],
 }
 
 impl LaneSums {
@@ -33,7 +37,7 @@ impl LaneSums {
     }
 
     /// Rotates the parts so that the next point belongs to the first of them.
-    fn align(&mut self) {
+    pub fn align(&mut self) {
         let part = self.next_part();
         if part != 0 {
             self.parts.iter_mut().for_each(|sum| sum.rotate_left(part));
@@ -60,54 +64,10 @@ impl LaneSums {
 
 /// Returns the terms of the sums of a point.
 #[inline(always)]
-fn terms(u: f64, v: f64, deviation: f64) -> [f64; TERMS] {
+pub(super) fn terms(u: f64, v: f64, deviation: f64) -> [f64; TERMS] {
     // (r² − 1)/2 without cancellation.
     let q = deviation + deviation * deviation / 2.0;
     [u * u, u * v, v * v, u, v, u * q, v * q, q, q * q, deviation]
-}
-
-/// Addition of whole groups of points of a circle.
-pub(super) struct GroupAddition<'a> {
-    pub assessor: &'a mut CircleAssessor,
-    pub xs: &'a [[f64; LANES]],
-    pub ys: &'a [[f64; LANES]],
-}
-
-impl SliceOperation for GroupAddition<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let GroupAddition { assessor, xs, ys } = self;
-        let ([center_x, center_y], radius) = (assessor.center, assessor.radius);
-        assessor.sums.align();
-        let (mut sums, mut sector) = (assessor.sums.parts, assessor.sector);
-        let [mut least, mut largest] = assessor.range.map(|value| [value; LANES]);
-        for (x, y) in xs.iter().zip(ys) {
-            let (mut x, mut y, mut deviations) = (*x, *y, [0.0; LANES]);
-            for k in 0..LANES {
-                (x[k], y[k]) = (x[k] - center_x, y[k] - center_y);
-                deviations[k] = (x[k] * x[k] + y[k] * y[k]).sqrt() - radius;
-                let terms = terms(x[k] / radius, y[k] / radius, deviations[k] / radius);
-                for (sum, term) in sums.iter_mut().zip(terms) {
-                    sum[k] += term;
-                }
-                least[k] = if deviations[k] < least[k] { deviations[k] } else { least[k] };
-                largest[k] = if deviations[k] > largest[k] { deviations[k] } else { largest[k] };
-            }
-            for k in 0..LANES {
-                if !sector.contains(x[k], y[k]) {
-                    sector = sector.of_next_point(x[k], y[k]);
-                }
-                assessor.bins[sector.bin].add([x[k], y[k]], deviations[k]);
-            }
-        }
-        assessor.sums.parts = sums;
-        assessor.sums.count += xs.len().min(ys.len()) * LANES;
-        assessor.sector = sector;
-        let of_all = |lanes: [f64; LANES], pick: fn(f64, f64) -> f64| lanes.into_iter().fold(lanes[0], pick);
-        assessor.range = [of_all(least, f64::min), of_all(largest, f64::max)];
-    }
 }
 
 /// Range of polar angles of a bin, as directions of its ends.
@@ -154,4 +114,59 @@ impl Sector {
 fn direction(bin: usize) -> [f64; 2] {
     let (sine, cosine) = (bin as f64 / BINS as f64 * TAU - PI).sin_cos();
     [cosine, sine]
+}
+
+/// Returns the bin of the polar angle of a point relative to the nominal center.
+pub(super) fn bin_of(x: f64, y: f64) -> usize {
+    // The conversion to an index truncates; the angle π belongs to the last bin.
+    let bin = ((y.atan2(x) + PI) / TAU * BINS as f64) as usize;
+    bin.min(BINS - 1)
+}
+
+/// Sums over points (u, v), in units of the radius about the nominal center.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sums {
+    pub count: f64,
+    /// Sums of u², u v and v².
+    pub products: Vector3<f64>,
+    /// Sums of u and v.
+    pub first: Vector2<f64>,
+    /// Sum of (u, v, 1) q.
+    pub right: Vector3<f64>,
+    /// Sum of q².
+    pub square: f64,
+    /// Sum of the radial deviation.
+    pub deviation: f64,
+}
+
+impl Sums {
+    pub fn plus(&self, other: &Self) -> Self {
+        Self {
+            count: self.count + other.count,
+            products: self.products + other.products,
+            first: self.first + other.first,
+            right: self.right + other.right,
+            square: self.square + other.square,
+            deviation: self.deviation + other.deviation,
+        }
+    }
+
+    /// Returns the sum of (u, v, 1)(u, v, 1)ᵀ.
+    pub fn normal(&self) -> Matrix3<f64> {
+        let ([uu, uv, vv], [u, v]) = (self.products.into(), self.first.into());
+        Matrix3::new(uu, uv, u, uv, vv, v, u, v, self.count)
+    }
+
+    /// Returns the sums divided by the number of points, `None` without a point.
+    pub fn means(&self) -> Option<Self> {
+        let n = self.count;
+        (n > 0.0).then(|| Self {
+            count: 1.0,
+            products: self.products / n,
+            first: self.first / n,
+            right: self.right / n,
+            square: self.square / n,
+            deviation: self.deviation / n,
+        })
+    }
 }

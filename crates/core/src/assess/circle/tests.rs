@@ -1,6 +1,8 @@
 //! Circularity compared with closed forms and with a fit to all points.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use nalgebra::{Matrix3, Vector3};
 
 use super::*;
 

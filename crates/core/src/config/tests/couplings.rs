@@ -58,7 +58,7 @@ fn a_workpiece_needs_a_mass_two_tables_and_possible_moments() {
     linear.set("joints", Value::TextList(names), &ValueSource::named("test")).expect("valid");
     assert_eq!(
         set(&mut linear, &["workpiece.mass_kg=40"]).expect_err("a rejection"),
-        "test: workpiece.mass_kg = 40: must be 0 on a machine without rotary joints a and c, which carry the workpiece"
+        "test: workpiece.mass_kg = 40: must be 0 on a machine without tables c and a, which carry the workpiece (kinematics.chain)"
     );
 }
 

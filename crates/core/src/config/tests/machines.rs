@@ -3,7 +3,9 @@
 use std::f64::consts::{PI, TAU};
 
 use super::{MIKRON, mikron};
-use crate::config::{AxisConfig, AxisKind, KinematicsConfig, MachineConfig, Parameters, ValueSource};
+use crate::config::{
+    AxisConfig, AxisKind, KinematicsConfig, MachineConfig, Parameters, RotaryChain, ValueSource,
+};
 
 /// Relative tolerance for the conversion of units.
 const ROUNDING: f64 = 1e-12;
@@ -17,7 +19,7 @@ fn assert_near(actual: f64, expected: f64, what: &str) {
 }
 
 fn machine(name: &str) -> MachineConfig {
-    let parameters = Parameters::builtin(name).expect("a built-in machine");
+    let parameters = Parameters::load(name, virtual_axes_builtin::MACHINES).expect("a built-in machine");
     parameters.machine_config().expect("a valid machine")
 }
 
@@ -211,6 +213,8 @@ fn each_kinematics_value_has_its_key() {
         "tool_length",
         "pivot_a_y",
         "pivot_a_z",
+        "pivot_b_x",
+        "pivot_b_z",
         "pivot_c_x",
         "pivot_c_y",
         "workpiece_x",
@@ -223,10 +227,12 @@ fn each_kinematics_value_has_its_key() {
     }
     let machine = parameters.machine_config().expect("a valid machine");
     let expected = KinematicsConfig {
+        chain: RotaryChain::default(),
         tool_length: 1.0,
         pivot_a: [2.0, 3.0],
-        pivot_c: [4.0, 5.0],
-        workpiece: [6.0, 7.0, 8.0],
+        pivot_b: [4.0, 5.0],
+        pivot_c: [6.0, 7.0],
+        workpiece: [8.0, 9.0, 10.0],
     };
     assert_eq!(machine.kinematics(), &expected);
 }
@@ -242,12 +248,13 @@ fn a_file_without_kinematics_has_zero_tool_length() {
 
 #[test]
 fn builtin_machines_are_valid_and_the_default_is_the_first() {
-    let names: Vec<&str> = Parameters::builtin_names().collect();
-    assert_eq!(names, ["mikron_ucp710", "linear_motor_center"]);
-    for name in names {
-        assert_eq!(machine(name).axes().len(), 5);
-    }
-    assert_eq!(Parameters::builtin("mikron_ucp710"), Ok(mikron()));
+    let names: Vec<&str> = virtual_axes_builtin::MACHINES.iter().map(|(name, _)| *name).collect();
+    assert_eq!(names[..2], ["mikron_ucp710", "linear_motor_center"]);
+    let axes =
+        |name: &str| machine(name).axes().iter().map(|axis| axis.name().to_owned()).collect::<String>();
+    let axes: Vec<String> = names.iter().map(|name| axes(name)).collect();
+    assert_eq!(axes, ["xyzac", "xyzac", "xyz", "xyzb", "xyz", "xyzbc", "xyzac"]);
+    assert_eq!(Parameters::load("mikron_ucp710", virtual_axes_builtin::MACHINES), Ok(mikron()));
 }
 
 #[test]

@@ -74,9 +74,9 @@ fn unreadable_files() {
 #[test]
 fn unknown_builtin_machine() {
     assert_eq!(
-        Parameters::builtin("mikron").map_err(|error| error.to_string()),
+        Parameters::builtin_text("mikron", virtual_axes_builtin::MACHINES).map_err(|error| error.to_string()),
         Err("unknown machine mikron; the nearest is mikron_ucp710; built-in machines: mikron_ucp710, \
-             linear_motor_center"
+             linear_motor_center, vmc, hmc, gantry_router, bc_center, fork_head"
             .to_owned())
     );
 }

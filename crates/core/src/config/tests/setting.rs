@@ -2,8 +2,8 @@
 
 use super::mikron;
 use crate::config::{
-    Assignment, ConfigError, DEFINITIONS, ParameterKind, Parameters, Presence, Scope, TimeMode, Value,
-    ValueSource, listing,
+    Assignment, DEFINITIONS, ParameterKind, Parameters, Presence, Scope, TimeMode, Value, ValueSource,
+    listing, parse_assignment,
 };
 
 fn source() -> ValueSource {
@@ -25,8 +25,8 @@ fn rejection(text: &str) -> String {
 #[test]
 fn every_live_key_accepts_both_ends_of_its_range() {
     let mut live = 0;
-    for machine in Parameters::builtin_names() {
-        let start = Parameters::builtin(machine).expect("a built-in machine");
+    for machine in virtual_axes_builtin::MACHINES.iter().map(|(name, _)| *name) {
+        let start = Parameters::load(machine, virtual_axes_builtin::MACHINES).expect("a built-in machine");
         for (key, definition) in start.definitions().filter(|(_, definition)| definition.is_live) {
             live += 1;
             let values = match definition.kind {
@@ -63,14 +63,13 @@ fn every_live_key_accepts_both_ends_of_its_range() {
             let mut parameters = start.clone();
             let error = parameters.set(&format!("{key}q"), Value::Double(1.0), &source());
             assert!(
-                matches!(&error, Err(ConfigError::UnknownKey { nearest: Some(nearest), .. }) if *nearest == key),
+                matches!(&error, Err(error) if error.to_string().ends_with(&format!("; the nearest is {key}"))),
                 "{error:?}"
             );
             assert_eq!(parameters, start);
         }
     }
-    // 40 on each of five axes, one of the machine, and four of the node.
-    assert_eq!(live, 2 * (5 * 40 + 1 + 4));
+    assert!(live > 400, "{live}");
 }
 
 #[test]
@@ -259,6 +258,99 @@ other:
 }
 
 #[test]
+fn parameters_of_other_nodes_are_ignored_in_a_section_for_several_nodes() {
+    let text = "\
+/**:
+  ros__parameters:
+    cell_name: hall_3
+    x.velocity_loop.gain: 4
+    x.velocity_loop.gian: 5
+mill:
+  ros__parameters:
+    qos_overrides./joint_states.publisher.depth: 5
+    publish_rate: null
+";
+    let mut parameters = mikron();
+    let overlay = parameters.overlay_yaml(text, "site.yaml", Some("/mill")).expect("a valid file");
+    assert_eq!((overlay.parameters, overlay.ignored.len()), (1, 3));
+    assert_eq!(overlay.ignored[0], "site.yaml:3: unknown parameter cell_name");
+    assert_eq!(
+        overlay.ignored[1],
+        "site.yaml:5: unknown parameter x.velocity_loop.gian; the nearest is x.velocity_loop.gain"
+    );
+    assert_eq!(parameters.get("x.velocity_loop.gain"), Some(Value::Double(4.0)));
+    assert_eq!(parameters.node_config().publish_rate, None);
+
+    let own = text.replace("/**:", "/mill:").replace("\nmill:", "\n/*:");
+    let error = parameters.overlay_yaml(&own, "site.yaml", Some("/mill")).map_err(|error| error.to_string());
+    assert_eq!(error, Err("site.yaml:3: unknown parameter cell_name".to_owned()));
+
+    let ignored = |text: &str| {
+        let assignment = parse_assignment(text, &ValueSource::named("-p")).expect("an assignment");
+        parameters.ignored(&assignment).map(|reason| reason.to_string())
+    };
+    assert_eq!(ignored("foreign:=1").as_deref(), Some("-p: unknown parameter foreign"));
+    assert!(ignored("start_type_description_service:=false").is_some());
+    assert!(
+        ignored("gains.x.p:=2.0")
+            .is_some_and(|reason| reason.starts_with("-p: gains.x.p = 2: must be omitted"))
+    );
+    for own in ["x.velocity_loop.gian:=4", "constraints.goal_time:=1", "command_interfaces:=[position]"] {
+        assert_eq!(ignored(own), None);
+    }
+}
+
+#[test]
+fn a_file_of_a_controller_is_followed_as_far_as_the_node_can() {
+    let text = "\
+arm:
+  ros__parameters:
+    joints: [shoulder, elbow]
+    command_interfaces: [effort]
+    state_publish_rate: 100.0
+    interpolation_method: cubic
+    vendor_extension: 3
+    gains:
+      shoulder: {p: 1.0, i: 0.0}
+      elbow: {p: 2.0}
+    constraints:
+      goal_time: 0.5
+      elbow: {goal: 0.1}
+      x: {goal: 0.002, trajectory: -1.0}
+      y: {goal: 0.1}
+";
+    let mut parameters = mikron();
+    let overlay = parameters.overlay_yaml(text, "arm.yaml", Some("/arm")).expect("the file of a controller");
+    let ignored: Vec<_> =
+        overlay.ignored.iter().map(|reason| reason.split([' ', ';']).collect::<Vec<_>>()).collect();
+    let keys: Vec<_> = ignored.iter().map(|words| (words[0], words[1])).collect();
+    let expected = [
+        ("arm.yaml:3:", "joints"),
+        ("arm.yaml:4:", "command_interfaces"),
+        ("arm.yaml:5:", "state_publish_rate"),
+        ("arm.yaml:6:", "interpolation_method"),
+        ("arm.yaml:7:", "unknown"),
+        ("arm.yaml:9:", "gains.shoulder.p"),
+        ("arm.yaml:13:", "constraints.elbow.goal"),
+        ("arm.yaml:14:", "constraints.x.trajectory"),
+    ];
+    assert_eq!(keys, expected);
+    assert_eq!(parameters.get("constraints.x.goal"), Some(Value::Double(0.002)));
+    assert_eq!(parameters.get("goal_time_tolerance"), Some(Value::Double(0.5)));
+    assert_eq!(parameters.machine_config().map(|machine| machine.axes().len()), Ok(5));
+
+    // Joints of this machine are followed, with their prefix.
+    let text = text.replace("[shoulder, elbow]", "[cell_x, cell_c]\n    joint_prefix: cell_");
+    let overlay = parameters.overlay_yaml(&text, "arm.yaml", Some("/arm")).expect("the file of a controller");
+    // Not its joints any more, but the constraint of a joint that it does not have.
+    assert_eq!(overlay.ignored.len(), expected.len());
+    assert!(
+        overlay.ignored.last().is_some_and(|reason| reason.contains("constraints.y.goal does not apply"))
+    );
+    assert_eq!(parameters.get("joints"), Some(Value::TextList(vec!["x".to_owned(), "c".to_owned()])));
+}
+
+#[test]
 fn an_overlay_for_another_node_changes_nothing() {
     let mut parameters = mikron();
     let text = "/mill:\n  ros__parameters:\n    nonsense: 1\n";
@@ -287,7 +379,8 @@ fn a_complete_machine_replaces_the_machine_and_keeps_node_parameters() {
     let text = include_str!("../../../config/linear_motor_center.yaml");
     let overlay = parameters.overlay_yaml(text, "other.yaml", None);
     assert_eq!(overlay.map(|overlay| overlay.is_machine_replaced), Ok(true));
-    let expected = Parameters::builtin("linear_motor_center").map(|machine| machine.machine_config());
+    let expected = Parameters::load("linear_motor_center", virtual_axes_builtin::MACHINES)
+        .map(|machine| machine.machine_config());
     assert_eq!(Ok(parameters.machine_config()), expected);
     assert_eq!(parameters.node_config().joint_prefix, "mill_");
 }

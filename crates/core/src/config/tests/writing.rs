@@ -22,8 +22,8 @@ fn assert_reads_back(parameters: &Parameters) -> Result<(), TestCaseError> {
 
 #[test]
 fn builtin_machines_are_unchanged_by_a_round_trip() {
-    for name in Parameters::builtin_names() {
-        let parameters = Parameters::builtin(name).expect("a built-in machine");
+    for name in virtual_axes_builtin::MACHINES.iter().map(|(name, _)| *name) {
+        let parameters = Parameters::load(name, virtual_axes_builtin::MACHINES).expect("a built-in machine");
         assert_reads_back(&parameters).expect(name);
     }
 }
@@ -76,12 +76,12 @@ fn joint_names_that_are_yaml_booleans_are_quoted() {
 proptest! {
     #[test]
     fn changed_values_are_bit_identical_after_a_round_trip(
-        machine in prop::sample::select(Parameters::builtin_names().collect::<Vec<_>>()),
+        machine in prop::sample::select(virtual_axes_builtin::MACHINES.iter().map(|(name, _)| *name).collect::<Vec<_>>()),
         name in any::<String>(),
         changes in prop::collection::vec((any::<prop::sample::Index>(), 0.0..1.0f64, -300i32..300), 1..40),
         list in prop::collection::vec(-1e300..1e300f64, 1..32),
     ) {
-        let mut parameters = Parameters::builtin(machine).expect("a built-in machine");
+        let mut parameters = Parameters::load(machine, virtual_axes_builtin::MACHINES).expect("a built-in machine");
         parameters.set("machine", Value::Text(name), &source()).expect("any text");
         let all: Vec<_> = parameters.definitions().collect();
         for (index, fraction, exponent) in changes {

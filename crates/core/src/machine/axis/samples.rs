@@ -1,7 +1,7 @@
 //! Samples of an axis from its state and the records of the inner loops.
 
-use super::super::inner_loops::{InnerLoopState, TickRecord};
-use super::{Axis, AxisParameters, AxisSample, DriveState};
+use super::super::inner_loops::{DriveState, InnerLoopState, TickRecord};
+use super::{Axis, AxisParameters, AxisSample};
 
 impl Axis {
     /// Sets the sample to a tick of the present position cycle.

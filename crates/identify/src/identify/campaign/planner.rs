@@ -6,7 +6,7 @@ use virtual_axes_core::path::{Block, Frame, Move, PathLimits, Program};
 use virtual_axes_core::trajectory::JointLimits;
 
 use super::error::CampaignError;
-use super::travel_limits::{CONSTANT, CampaignUnits, MOVING_ACCELERATION, ROUNDING, SWEEPS, TravelLimits};
+use super::travel_limits::{CONSTANT, MOVING_ACCELERATION, ROUNDING, SWEEPS, TravelLimits};
 
 /// Lowest speed, m/min or rev/min; at a resolution of 1 µm or 1 mdeg still hundreds of increments per second.
 const LOWEST_SPEED: f64 = 0.05;
@@ -118,7 +118,7 @@ impl<'a> CampaignPlanner<'a> {
     /// Returns the speeds for the friction law in rising order.
     fn speeds(&self) -> Vec<f64> {
         let highest = self.limits.max_speed;
-        let lowest = (LOWEST_SPEED * CampaignUnits::of(self.limits.axis).speed.1).min(LEAST_SPREAD * highest);
+        let lowest = (LOWEST_SPEED * self.limits.axis.units().speed).min(LEAST_SPREAD * highest);
         let offset = EVEN_BELOW * lowest;
         let ratio = (highest + offset) / (lowest + offset);
         let speed = |i: usize| (lowest + offset) * ratio.powf(i as f64 / (SPEEDS - 1) as f64) - offset;

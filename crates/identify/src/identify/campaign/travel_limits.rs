@@ -1,7 +1,7 @@
 //! Travel limits, speeds and settling time of a campaign.
 
-use virtual_axes_core::config::{AxisConfig, AxisKind, LimitsConfig, MachineConfig};
-use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER, REVOLUTION, RPM, seconds};
+use virtual_axes_core::config::{AxisConfig, AxisKind, AxisUnits, LimitsConfig, MachineConfig};
+use virtual_axes_core::units::{REVOLUTION, seconds};
 
 use super::error::CampaignError;
 use super::options::{CampaignOptions, SPEED_RESERVE};
@@ -26,23 +26,6 @@ pub(super) const MOVING_ACCELERATION: f64 = 0.5;
 pub(super) const SWEEPS: [f64; 2] = [0.25, 0.5];
 /// Rounding tolerance of lengths, relative to the window.
 pub(super) const ROUNDING: f64 = 1e-9;
-
-/// Display units of an axis.
-pub(super) struct CampaignUnits {
-    pub length: (&'static str, f64),
-    pub speed: (&'static str, f64),
-}
-
-impl CampaignUnits {
-    pub fn of(axis: &AxisConfig) -> Self {
-        match axis.kind {
-            AxisKind::Linear => {
-                CampaignUnits { length: ("mm", MILLIMETER), speed: ("m/min", METER_PER_MINUTE) }
-            }
-            AxisKind::Rotary => CampaignUnits { length: ("deg", DEGREE), speed: ("rpm", RPM) },
-        }
-    }
-}
 
 /// Usable range, highest speed and settling time of a campaign.
 pub(super) struct TravelLimits<'a> {
@@ -146,8 +129,7 @@ impl<'a> TravelLimits<'a> {
             let middle = 0.5 * (low + high);
             if self.leg_length(middle, 1.0, LEAST_CONSTANT) <= usable { low = middle } else { high = middle }
         }
-        let CampaignUnits { length: (unit, length), speed: (feed_unit, speed) } =
-            CampaignUnits::of(self.axis);
+        let AxisUnits { length, length_key: unit, speed, speed_name: feed_unit, .. } = self.axis.units();
         CampaignError::TooShort {
             axis: self.axis.name().to_owned(),
             found: round_to_four_digits(found / length, f64::round),
@@ -179,7 +161,7 @@ fn allowed_range(axis: &AxisConfig, options: &CampaignOptions) -> Result<[f64; 2
     if min.is_finite() && max.is_finite() && min < max && min >= travel_min && max <= travel_max {
         return Ok([min, max]);
     }
-    let (unit, length) = CampaignUnits::of(axis).length;
+    let AxisUnits { length, length_key: unit, .. } = axis.units();
     // Removes rounding errors of the unit conversion.
     let rounded = |value: f64| (value / length * 1e6).round() / 1e6;
     let end = |value: f64| match value.is_finite() {
@@ -198,7 +180,7 @@ fn allowed_range(axis: &AxisConfig, options: &CampaignOptions) -> Result<[f64; 2
 fn max_speed(axis: &AxisConfig, options: &CampaignOptions) -> Result<f64, CampaignError> {
     let by_motor = axis.motor.max_speed * axis.transmission_ratio;
     let allowed = SPEED_RESERVE * axis.limits.velocity.min(by_motor);
-    let (unit, speed) = CampaignUnits::of(axis).speed;
+    let AxisUnits { speed, speed_name: unit, .. } = axis.units();
     let Some(feed) = options.max_feed else { return Ok(allowed.min(DEFAULT_MAX_SPEED * speed)) };
     if feed > 0.0 && feed <= allowed * (1.0 + ROUNDING) {
         return Ok(feed.min(allowed));

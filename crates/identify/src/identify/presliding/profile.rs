@@ -3,9 +3,13 @@
 use rayon::prelude::*;
 
 use super::reversal::{Reversal, ReversalFit};
-use super::{FILTER, SIGNIFICANT};
 use crate::recording::deviation;
 use virtual_axes_core::statistics::{mean, median};
+
+/// Duration of the filter relative to the time in which an axis passes the length.
+const FILTER: f64 = 0.12;
+/// Standard errors of a significant damping.
+const SIGNIFICANT: f64 = 3.0;
 
 /// Residuals of each reversal over the trial lengths.
 pub(super) struct LengthProfile {

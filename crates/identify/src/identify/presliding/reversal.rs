@@ -1,11 +1,12 @@
 //! Friction current at one reversal, recorded and modeled.
 
 use super::super::fit::fit_linear;
-use super::super::friction::speed_unit;
 use super::super::reversals::{Leg, ReversingMotion};
-use super::WINDOW;
 use crate::recording::{GaussianFilter, SignalSpan, Signals, deviation};
 use virtual_axes_core::config::AxisConfig;
+
+/// Window on both sides of a reversal, in lengths of presliding: exp(−6) of the friction is left.
+pub(super) const WINDOW: f64 = 6.0;
 
 /// Span with current and its turning points.
 pub(super) struct SpanMotion<'a> {
@@ -25,7 +26,7 @@ impl<'a> SpanMotion<'a> {
     pub fn new(span: &'a SignalSpan, signals: &'a Signals, axis: &AxisConfig) -> Option<Self> {
         let current = span.current.as_deref()?;
         let motion = ReversingMotion::new(span, signals)?;
-        let (law, unit) = (&axis.friction, speed_unit(axis));
+        let (law, unit) = (&axis.friction, axis.units().speed);
         let of = |velocity: &f64| {
             let v = velocity.abs() / unit;
             law.a * (law.b * v).exp() + law.c * (law.d * v).exp()

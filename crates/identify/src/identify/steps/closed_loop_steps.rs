@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::super::closed_loop::{Experiment, find_experiments, position_residuals};
+use super::super::closed_loop::{find_experiments, position_residuals};
 use super::super::delays::{DelayParameter, fit_delay};
+use super::super::experiment::Experiment;
 use super::super::feedforward_mode::FeedforwardMode;
 use super::super::findings::report_delays;
 use super::super::friction::{Breakaway, FrictionLaw};
@@ -45,7 +46,7 @@ impl IdentificationSteps<'_> {
         if self.found.axis.position_loop.controller != PositionControllerConfig::Cascade {
             self.found.findings.push(Finding::missing(
                 "not-a-cascade",
-                "no delays and no refinement: the position controller of the machine file is not the cascade",
+                "no delays and no refinement: the position controller of the initial machine is not the cascade",
                 "record with the cascade and set `--set <joint>.position_loop.controller=cascade`",
             ));
             return;

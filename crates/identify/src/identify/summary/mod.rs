@@ -10,7 +10,6 @@ use serde::Serialize;
 
 use super::feedforward::FeedforwardFit;
 use super::feedforward_mode::FeedforwardMode;
-use super::friction::{speed_unit, speed_unit_name};
 use super::identification::Identification;
 use super::options::IdentificationInput;
 use super::segments::SegmentKind;
@@ -23,8 +22,8 @@ pub use steps::{
     RestSummary, SpeedSummary,
 };
 pub use transmission::{IntervalSummary, TransmissionSummary};
-use virtual_axes_core::config::AxisKind;
-use virtual_axes_core::units::{DEGREE, MILLIMETER, MILLISECOND};
+use virtual_axes_core::config::{AxisKind, AxisUnits};
+use virtual_axes_core::units::MILLISECOND;
 
 /// Summary of an identification: recordings, values, results of the steps, agreement and findings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -87,11 +86,13 @@ impl IdentificationSummary {
     ) -> Self {
         let (axis, found) = (&identification.initial, identification);
         let kind = axis.kind();
-        // Units of position and velocity residuals, SI.
-        let (position_unit, position, velocity_unit, velocity) = match kind {
-            AxisKind::Linear => ("um", 1e-6, "mm/s", MILLIMETER),
-            AxisKind::Rotary => ("mdeg", 1e-3 * DEGREE, "deg/s", DEGREE),
-        };
+        let AxisUnits {
+            error: position,
+            length: velocity,
+            error_key: position_unit,
+            speed_name: speed_unit,
+            ..
+        } = axis.units();
         let residuals = |agreement| ResidualSummary::new(agreement, position, velocity);
         let all = found.agreements.iter().map(Some).chain(std::iter::repeat(None));
         IdentificationSummary {
@@ -99,8 +100,8 @@ impl IdentificationSummary {
             axis: axis.name().to_owned(),
             kind,
             position_unit,
-            velocity_unit,
-            speed_unit: speed_unit_name(axis),
+            velocity_unit: if kind == AxisKind::Linear { "mm/s" } else { "deg/s" },
+            speed_unit,
             recordings: recordings
                 .iter()
                 .zip(all)
@@ -110,7 +111,7 @@ impl IdentificationSummary {
             friction: found
                 .friction
                 .as_ref()
-                .map(|friction| FrictionSummary::new(friction, &found.steady.levels, speed_unit(axis))),
+                .map(|friction| FrictionSummary::new(friction, &found.steady.levels, axis.units().speed)),
             inertia: InertiaSummary::new(found),
             presliding: found.presliding.as_ref().map(|fit| PreslidingSummary::new(fit, kind)),
             transmission: found.transmission.as_ref().map(|fit| TransmissionSummary::new(fit, kind)),
@@ -237,7 +238,7 @@ pub struct ResidualSummary {
     pub baseline: Option<BaselineSummary>,
 }
 
-/// RMS differences of the position from simple predictions and from the model, in the unit of position residuals.
+/// RMS and largest differences of the position from simple predictions and from the model, in the unit of position residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct BaselineSummary {
     /// From PSEC.
@@ -248,6 +249,10 @@ pub struct BaselineSummary {
     pub delayed: f64,
     /// From the model.
     pub model: f64,
+    /// Largest difference from the delayed PSEC.
+    pub delayed_max: f64,
+    /// Largest difference from the model.
+    pub model_max: f64,
 }
 
 impl ResidualSummary {
@@ -275,6 +280,8 @@ impl ResidualSummary {
                 lag_ms: baseline.lag / MILLISECOND,
                 delayed: baseline.delayed / position,
                 model: baseline.model / position,
+                delayed_max: baseline.delayed_max / position,
+                model_max: baseline.model_max / position,
             }),
         }
     }

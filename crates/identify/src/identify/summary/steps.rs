@@ -313,8 +313,12 @@ pub struct DelaySummary {
     pub feedforward: FeedforwardMode,
     /// Identified delay, ms.
     pub value_ms: f64,
-    /// Confidence interval of equivalent delays, ms: above the first and up to the second value.
+    /// Confidence interval, ms: above the first and up to the second value. All its delays give the same motion, but for β
+    /// and γ of a joint fit, whose interval is two standard errors wide on each side.
     pub interval_ms: [f64; 2],
+    /// True if the delay was fitted jointly with the others.
+    #[serde(skip)]
+    pub is_joint: bool,
     /// True if the value of the machine file was kept.
     #[serde(rename = "left")]
     pub is_unchanged: bool,
@@ -329,6 +333,7 @@ impl DelaySummary {
             feedforward: fit.delay.feedforward_mode(),
             value_ms: milliseconds(fit.value),
             interval_ms: [milliseconds(fit.interval.0), milliseconds(fit.interval.1)],
+            is_joint: fit.is_joint,
             is_unchanged: fit.is_unchanged,
             profile: fit.profile.iter().map(|(delay, rms)| [milliseconds(*delay), rms / unit]).collect(),
         }

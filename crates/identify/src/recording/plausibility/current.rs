@@ -7,16 +7,19 @@ use super::super::regression::{LeastSquares, correlation};
 use super::super::spans::{CURRENT, POSITION, VELOCITY};
 use super::{PlausibilityCheck, SAME};
 use virtual_axes_core::statistics::{median, quantile};
+use virtual_axes_core::units::Rounded;
 
 /// Largest permitted current relative to the current limit of the motor; recordings can contain peak instead
 /// of RMS values.
 const CURRENTS: f64 = 5.0;
+/// Largest current of the motor of an axis, A: the limit where the user has stated none.
+const LARGEST: f64 = 1000.0;
 /// Smallest contribution to R² of a significant effect.
 const EFFECT: f64 = 0.05;
 /// Smallest contribution of the acceleration to R² that determines the sign of the current.
 const INERTIAL: f64 = 0.01;
 /// Fewest samples in motion that determine the sign of the current.
-const FEWEST_MOVING: usize = 15;
+const FEWEST_MOVING: usize = 10;
 /// R² below which the current is unrelated to the motion.
 const EXPLAINED: f64 = 0.5;
 /// Smallest share of moving samples in each direction that separates friction from gravity.
@@ -26,17 +29,24 @@ impl PlausibilityCheck<'_> {
     pub(super) fn check_current_magnitude(&self) -> Result<(), ConditioningError> {
         let Some(current) = self.columns[CURRENT].as_deref() else { return Ok(()) };
         let largest = quantile(&mut current.iter().map(|i| i.abs()).collect::<Vec<_>>(), 0.99).unwrap_or(0.0);
-        let limit = self.axis.motor.max_current;
-        if largest <= CURRENTS * limit {
+        let (limit, allowed, what) = match self.stated.current {
+            true => {
+                let limit = self.axis.motor.max_current;
+                (limit, CURRENTS * limit, "the limit of the motor is")
+            }
+            false => (LARGEST, LARGEST, "that of an axis at most"),
+        };
+        if largest <= allowed {
             return Ok(());
         }
-        let looks_like = if largest * 1e-3 <= CURRENTS * limit {
+        let looks_like = if largest * 1e-3 <= allowed {
             "it is likely in mA; give --column current=COLUMN[mA]"
         } else {
             ""
         };
-        let looks_like = looks_like.to_owned();
-        Err(ConditioningError::CurrentTooLarge { name: self.name(), current: largest, limit, looks_like })
+        let (largest, limit) = (Rounded(largest), Rounded(limit));
+        let reason = format!("the current reaches {largest} A, {what} {limit} A");
+        self.error(reason, looks_like)
     }
 
     pub(super) fn check_current_column(&self) -> Result<(), ConditioningError> {
@@ -50,7 +60,11 @@ impl PlausibilityCheck<'_> {
         ];
         for (signal, correlation) in candidates.into_iter().chain(recorded) {
             if correlation.abs() > SAME {
-                return Err(ConditioningError::CurrentIsMotion { name: self.name(), signal, correlation });
+                let reason = format!(
+                    "the current is a multiple of the {signal} (correlation {correlation:.5}); its column likely contains a \
+                     {signal}"
+                );
+                return self.error(reason, "");
             }
         }
         Ok(())

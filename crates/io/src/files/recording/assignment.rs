@@ -1,16 +1,25 @@
 //! Assignment of columns to channels: by column mappings, default headers, or detected meanings.
 
-use super::axis_match::{axes_of, matching_axes};
+use super::axis_match::{axes_of, matching_axes, number_of};
 use super::columns::Column;
-use super::error::AxisRecordingError;
+use super::context::Context;
+use super::format::Found;
 use super::found_column::{ColumnFactor, FoundColumn};
-use super::layout::{Context, format_names};
 use super::unit::Channel;
-use crate::files::MAX_LISTED;
-use virtual_axes_core::text::{nearest_name, shortened};
+use crate::files::error::{ErrorKind, FileError, MAX_LISTED};
+use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 use virtual_axes_identify::recording::Finding;
 
-type Found<T> = Result<T, AxisRecordingError>;
+/// Maximum number of names in an error message.
+const MAX_NAMES: usize = 40;
+
+/// Formats names for an error message.
+fn format_names(names: &[String]) -> String {
+    let shown: Vec<String> = names.iter().take(MAX_NAMES).map(|name| shortened(name)).collect();
+    let more =
+        if names.len() > MAX_NAMES { format!(", … ({} columns)", names.len()) } else { String::new() };
+    shown.join(", ") + &more
+}
 
 /// Columns of the channels of one axis.
 #[derive(Debug, Default)]
@@ -76,6 +85,15 @@ struct Selector<'a> {
 }
 
 impl Context<'_> {
+    /// Assigns columns that a format describes by themselves.
+    ///
+    /// # Errors
+    /// The first column that cannot be assigned.
+    pub fn assign_found(&self, found: &[FoundColumn], at: &dyn Fn() -> String) -> Found<ColumnAssignment> {
+        let headers: Vec<String> = found.iter().map(|column| column.header.clone()).collect();
+        self.assign(&headers, found, at, &self.factors()?)
+    }
+
     /// Assigns the columns with the headers `columns` and the meanings `found` to channels.
     pub fn assign(
         &self,
@@ -121,12 +139,9 @@ impl Context<'_> {
             let Some(slot) = assignment.slots.get_mut(column) else { continue };
             if let Some((before, _)) = *slot {
                 let first = Channel::ALL.get(before).copied().unwrap_or(channel);
-                return Err(AxisRecordingError::SameColumn {
-                    at: at(),
-                    first,
-                    second: channel,
-                    number: column + 1,
-                });
+                let number = column + 1;
+                let reason = format!("{first} and {channel} both use column #{number}");
+                return Err(FileError::new(at(), reason));
             }
             *slot = Some((index, factor));
             let is_default = !assignment.detected_channels.contains(&index);
@@ -153,19 +168,16 @@ impl Context<'_> {
         if self.columns.mapping(channel).is_none() && !self.is_required(channel) {
             return Ok(());
         }
-        let mut error = self.no_column(channel, wanted, columns, at());
         let counter = found.iter().find(|column| column.unit.as_ref().is_some_and(|unit| unit.is_samples()));
-        if let (AxisRecordingError::NoColumn { hint, .. }, Channel::Time) = (&mut error, channel) {
-            *hint = match counter {
-                Some(column) => {
-                    let header = shortened(&column.header);
-                    format!(", or give the sampling rate by --rate-hz, since column {header} counts samples")
-                }
-                None => ", or give the sampling rate by --rate-hz".to_owned(),
-            }
-            .into();
-        }
-        Err(error)
+        let hint = match (channel, counter) {
+            (Channel::Time, Some(column)) => format!(
+                ", or give the sampling rate by --rate-hz, since column {} counts samples",
+                shortened(&column.header)
+            ),
+            (Channel::Time, None) => ", or give the sampling rate by --rate-hz".to_owned(),
+            _ => String::new(),
+        };
+        Err(self.no_column(channel, wanted, columns, at()).with_hint(&hint))
     }
 
     fn find(
@@ -181,8 +193,11 @@ impl Context<'_> {
         for name in wanted {
             let count = columns.iter().filter(|column| *column == name).count();
             if count > 1 {
-                let column = shortened(name);
-                return Err(AxisRecordingError::SameHeader { at: at(), channel, column, count });
+                let reason = format!(
+                    "{count} columns have the header \"{}\"; select the column of {channel} by number, for example #3",
+                    shortened(name)
+                );
+                return Err(FileError::new(at(), reason));
             }
             if count == 1 {
                 return Ok(columns.iter().position(|column| column == name));
@@ -191,27 +206,21 @@ impl Context<'_> {
         Ok(None)
     }
 
-    fn no_column(
-        &self,
-        channel: Channel,
-        wanted: &[String],
-        columns: &[String],
-        at: String,
-    ) -> AxisRecordingError {
+    fn no_column(&self, channel: Channel, wanted: &[String], columns: &[String], at: String) -> FileError {
         let names = || columns.iter().map(String::as_str);
         let nearest = wanted.iter().find_map(|name| nearest_name(name, names()));
         // A column named after the axis is probably its position.
         let axis = || names().find(|name| *name == self.joint).map(str::to_owned);
         let mut wanted: Vec<String> = wanted.iter().map(|name| format!("\"{}\"", shortened(name))).collect();
         wanted.dedup();
-        AxisRecordingError::NoColumn {
-            at,
-            channel,
-            wanted: wanted.join(" or "),
-            found: format_names(columns),
-            nearest: nearest.or_else(axis),
-            hint: Box::default(),
-        }
+        let reason = format!(
+            "there is no column {} for {channel}; there are {}{}; time and position are required: select a column by --column \
+             CHANNEL=COLUMN[UNIT]",
+            wanted.join(" or "),
+            format_names(columns),
+            nearest_hint(&nearest.or_else(axis))
+        );
+        FileError::new(at, reason).with_kind(ErrorKind::NoColumn)
     }
 }
 
@@ -249,7 +258,7 @@ impl<'a> Selector<'a> {
         }
         // A number does not contradict the name of the axis.
         if let ([(axis, _)], false) = (axes.as_slice(), self.context.is_joint_given)
-            && axis.bytes().all(|byte| byte.is_ascii_digit())
+            && number_of(axis).is_some()
         {
             return Ok(Some(axis));
         }
@@ -257,13 +266,14 @@ impl<'a> Selector<'a> {
         Err(self.axis_error("the file has no columns of", &names))
     }
 
-    fn axis_error(&self, reason: &'static str, axes: &[&str]) -> AxisRecordingError {
-        AxisRecordingError::Axis {
-            at: (self.at)(),
-            reason,
-            axis: shortened(self.context.joint),
-            axes: axes.iter().take(MAX_LISTED).map(|axis| shortened(axis)).collect(),
-        }
+    fn axis_error(&self, reason: &'static str, axes: &[&str]) -> FileError {
+        let axes: Vec<String> = axes.iter().take(MAX_LISTED).map(|axis| shortened(axis)).collect();
+        let axis = shortened(self.context.joint);
+        let axes = axes.join(", ");
+        FileError::new(
+            (self.at)(),
+            format_args!("{reason} axis {axis}; there are the axes {axes}: select one by --joint"),
+        )
     }
 
     /// Returns the detected column of the channel with its factor to SI.
@@ -286,16 +296,18 @@ impl<'a> Selector<'a> {
         match fitting.as_slice() {
             [] => Ok(None),
             [column] => self.accept(channel, column, assignment),
-            several => Err(AxisRecordingError::Ambiguous {
-                at: (self.at)(),
-                channel,
-                columns: several
-                    .iter()
-                    .take(MAX_LISTED)
+            several @ [first, ..] => {
+                let columns = several.iter().take(MAX_LISTED);
+                let columns: Vec<String> = columns
                     .map(|column| format!("#{} \"{}\"", column.number, shortened(&column.header)))
-                    .collect(),
-                number: several.first().map_or(1, |column| column.number),
-            }),
+                    .collect();
+                let reason = format!(
+                    "columns {} all fit {channel}: select one, for example by --column '{channel}=#{}'",
+                    columns.join(", "),
+                    first.number
+                );
+                Err(FileError::new((self.at)(), reason))
+            }
         }
     }
 
@@ -341,21 +353,18 @@ impl<'a> Selector<'a> {
             (ColumnFactor::Samples, Some(_)) => 1.0,
             (ColumnFactor::Samples, None) => return Ok(None),
             (problem @ (ColumnFactor::Unfit | ColumnFactor::Unknown), _) => {
-                let error = AxisRecordingError::ColumnUnit {
-                    at: (self.at)(),
-                    channel,
-                    column: shortened(&column.header),
-                    found: match problem {
-                        ColumnFactor::Unfit => format!("is in {unit}"),
-                        _ => format!("has the {}", unit.to_string().replacen("unknown:", "unknown unit", 1)),
-                    },
-                    allowed: channel
-                        .units(context.axis)
-                        .iter()
-                        .map(|(s, _)| *s)
-                        .collect::<Vec<_>>()
-                        .join(", "),
+                let found = match problem {
+                    ColumnFactor::Unfit => format!("is in {unit}"),
+                    _ => format!("has the {}", unit.to_string().replacen("unknown:", "unknown unit", 1)),
                 };
+                let allowed: Vec<&str> = channel.units(context.axis).iter().map(|(s, _)| *s).collect();
+                let reason = format!(
+                    "{channel} from column {} {found}, must be in one of {}; give the unit by --column \
+                     '{channel}=COLUMN[UNIT]', for example with a factor: [25.4 mm]",
+                    shortened(&column.header),
+                    allowed.join(", ")
+                );
+                let error = FileError::new((self.at)(), reason);
                 // Without the current there is neither inertia nor friction.
                 let is_unknown_current =
                     channel == Channel::Current && matches!(problem, ColumnFactor::Unknown);

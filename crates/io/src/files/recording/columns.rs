@@ -8,6 +8,7 @@ use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
 
 use super::unit::{Channel, Unit};
+use crate::files::error::FileError;
 use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 use virtual_axes_core::yaml;
 
@@ -22,7 +23,7 @@ use virtual_axes_core::yaml;
 /// for text in ["time=t[ms]", "position=Pos1 [mm]", "current=#4[-1 A]", "velocity=[m/min]", "delimiter=;"] {
 ///     columns.set(text, "--column")?;
 /// }
-/// # Ok::<(), virtual_axes_io::files::ColumnsError>(())
+/// # Ok::<(), virtual_axes_io::files::FileError>(())
 /// ```
 ///
 /// COLUMN is a header, or `#` and a number from 1; default is the channel name. UNIT is a symbol with an optional
@@ -59,59 +60,6 @@ pub(super) enum Column {
     Index(usize),
 }
 
-/// Error of a column mapping.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ColumnsError {
-    /// The mapping file cannot be read.
-    #[error("{at}: {reason}")]
-    Unreadable {
-        /// File, and line if known.
-        at: String,
-        /// Error message of the reader.
-        reason: String,
-    },
-    /// An entry has no `=`.
-    #[error(
-        "{at}: \"{found}\" is not a column mapping, must be CHANNEL=COLUMN[UNIT], for example position=Pos1[mm]"
-    )]
-    Syntax {
-        /// Origin of the entry: option or file.
-        at: String,
-        /// Text found.
-        found: String,
-    },
-    /// The key of an entry is unknown.
-    #[error("{at}: unknown key \"{found}\"; known are {}{}", known_keys(), nearest_hint(.nearest))]
-    Unknown {
-        /// Origin of the entry: option or file.
-        at: String,
-        /// Key found.
-        found: String,
-        /// Most similar key.
-        nearest: Option<String>,
-    },
-    /// A key occurs twice.
-    #[error("{at}: {key} is given twice")]
-    Duplicate {
-        /// Origin of the entry: option or file.
-        at: String,
-        /// Duplicate key.
-        key: String,
-    },
-    /// The value of a key is invalid.
-    #[error("{at}: {key}={found}: {reason}")]
-    Value {
-        /// Origin of the entry: option or file.
-        at: String,
-        /// Key of the value.
-        key: String,
-        /// Value found.
-        found: String,
-        /// Reason, with the allowed values.
-        reason: String,
-    },
-}
-
 /// Key of the delimiter character.
 const DELIMITER: &str = "delimiter";
 const DECIMAL_COMMA: &str = "decimal_comma";
@@ -119,20 +67,19 @@ const SKIP_LINES: &str = "skip_lines";
 /// Word for the tab character.
 const TAB: &str = "tab";
 
+/// Detected delimiters; the one with the fewest other uses first.
+const USUAL_DELIMITERS: [char; 3] = [';', '\t', ','];
+
 fn keys() -> impl Iterator<Item = &'static str> {
     Channel::ALL.into_iter().map(Channel::name).chain([DELIMITER, DECIMAL_COMMA, SKIP_LINES])
-}
-
-fn known_keys() -> String {
-    keys().collect::<Vec<_>>().join(", ")
 }
 
 impl Columns {
     /// Reads an optional YAML file, then applies `texts`, which take precedence. `at` is the origin of `texts` in errors.
     ///
     /// # Errors
-    /// Returns a [`ColumnsError`] if the file or a text is invalid, or if two texts set the same key.
-    pub fn read<T: AsRef<str>>(file: Option<&Path>, texts: &[T], at: &str) -> Result<Self, ColumnsError> {
+    /// Returns a [`FileError`] if the file or a text is invalid, or if two texts set the same key.
+    pub fn read<T: AsRef<str>>(file: Option<&Path>, texts: &[T], at: &str) -> Result<Self, FileError> {
         let mut columns = match file {
             Some(file) => Self::open(file)?,
             None => Columns::default(),
@@ -143,7 +90,7 @@ impl Columns {
             columns.set(text, at)?;
             let key = text.split('=').next().unwrap_or_default().trim();
             if given.contains(&key) {
-                return Err(ColumnsError::Duplicate { at: at.to_owned(), key: key.to_owned() });
+                return Err(FileError::new(at, format_args!("{key} is given twice")));
             }
             given.push(key);
         }
@@ -153,17 +100,16 @@ impl Columns {
     /// Reads a YAML file; see [`Columns::from_yaml`].
     ///
     /// # Errors
-    /// Returns a [`ColumnsError`] if the file cannot be read or is invalid.
-    pub fn open(path: &Path) -> Result<Self, ColumnsError> {
+    /// Returns a [`FileError`] if the file cannot be read or is invalid.
+    pub fn open(path: &Path) -> Result<Self, FileError> {
         let at = path.display().to_string();
-        let unreadable =
-            |error: std::io::Error| ColumnsError::Unreadable { at: at.clone(), reason: error.to_string() };
+        let unreadable = |error: std::io::Error| FileError::new(&at, error);
         let mut text = String::new();
         let file = fs::File::open(path).map_err(unreadable)?;
         file.take(MAX_FILE_BYTES).read_to_string(&mut text).map_err(unreadable)?;
         if text.len() as u64 == MAX_FILE_BYTES {
             let reason = format!("a column mapping file must be shorter than {MAX_FILE_BYTES} bytes");
-            return Err(ColumnsError::Unreadable { at, reason });
+            return Err(FileError::new(at, reason));
         }
         Self::from_yaml(&text, &at)
     }
@@ -172,21 +118,16 @@ impl Columns {
     /// file name in errors.
     ///
     /// # Errors
-    /// Returns a [`ColumnsError`] for the first invalid entry.
-    pub fn from_yaml(text: &str, name: &str) -> Result<Self, ColumnsError> {
-        let unreadable = |at: String, reason: String| Err(ColumnsError::Unreadable { at, reason });
-        let mut documents: Vec<Entries> = match yaml::documents(text) {
-            Ok(documents) => documents,
-            Err(error) => return unreadable(error.position(name), error.reason),
-        };
+    /// Returns a [`FileError`] for the first invalid entry.
+    pub fn from_yaml(text: &str, name: &str) -> Result<Self, FileError> {
+        let mut documents: Vec<Entries> =
+            yaml::documents(text).map_err(|error| FileError::new(error.position(name), error.reason))?;
         let (Some(entries), true) = (documents.pop(), documents.is_empty()) else {
-            return unreadable(
-                name.to_owned(),
-                "the file must contain exactly one mapping of channels to columns".to_owned(),
-            );
+            let reason = "the file must contain exactly one mapping of channels to columns";
+            return Err(FileError::new(name, reason));
         };
         let mut columns = Columns::default();
-        for (key, Scalar(value)) in entries.into_all() {
+        for (key, value) in entries.into_all() {
             columns.put(key, &value, name)?;
         }
         Ok(columns)
@@ -195,23 +136,22 @@ impl Columns {
     /// Sets one entry from `KEY=VALUE`, replacing an earlier one. `at` is the origin of the text in errors.
     ///
     /// # Errors
-    /// Returns a [`ColumnsError`] if the key or the value is invalid.
-    pub fn set(&mut self, text: &str, at: &str) -> Result<(), ColumnsError> {
+    /// Returns a [`FileError`] if the key or the value is invalid.
+    pub fn set(&mut self, text: &str, at: &str) -> Result<(), FileError> {
         let Some((key, value)) = text.split_once('=') else {
-            return Err(ColumnsError::Syntax { at: at.to_owned(), found: shortened(text) });
+            let reason = format!(
+                "\"{}\" is not a column mapping, must be CHANNEL=COLUMN[UNIT], for example position=Pos1[mm]",
+                shortened(text)
+            );
+            return Err(FileError::new(at, reason));
         };
         self.put(key.trim(), value, at)
     }
 
-    fn put(&mut self, key: &str, value: &str, at: &str) -> Result<(), ColumnsError> {
+    fn put(&mut self, key: &str, value: &str, at: &str) -> Result<(), FileError> {
         // White space can be a delimiter.
         let value = if key == DELIMITER { value } else { value.trim() };
-        let wrong = |reason: &str| ColumnsError::Value {
-            at: at.to_owned(),
-            key: key.to_owned(),
-            found: shortened(value),
-            reason: reason.to_owned(),
-        };
+        let wrong = |reason: &str| FileError::new(at, format_args!("{key}={}: {reason}", shortened(value)));
         if let Some(channel) = Channel::from_name(key) {
             let (column, unit) = column_and_unit(value).map_err(|reason| wrong(&reason))?;
             self.mappings.retain(|mapping| mapping.channel != channel);
@@ -228,8 +168,13 @@ impl Columns {
                 self.skip_lines = value.parse().map_err(|_| wrong("must be an integer of at least 0"))?;
             }
             _ => {
-                let nearest = nearest_name(key, keys());
-                return Err(ColumnsError::Unknown { at: at.to_owned(), found: shortened(key), nearest });
+                let reason = format!(
+                    "unknown key \"{}\"; known are {}{}",
+                    shortened(key),
+                    keys().collect::<Vec<_>>().join(", "),
+                    nearest_hint(&nearest_name(key, keys()))
+                );
+                return Err(FileError::new(at, reason));
             }
         }
         if self.decimal_comma && self.delimiter == Some(',') {
@@ -257,6 +202,18 @@ impl Columns {
             (SKIP_LINES, self.skip_lines > 0),
         ];
         keys.into_iter().filter(|(_, is_set)| *is_set).map(|(key, _)| key).collect()
+    }
+
+    /// Returns the delimiter of a line: that of the mapping, or the one detected.
+    pub(super) fn delimiter_of(&self, text: &str) -> char {
+        let found = || {
+            let usable = |d: &char| !(self.decimal_comma && *d == ',');
+            USUAL_DELIMITERS
+                .into_iter()
+                .find(|d| usable(d) && text.contains(*d))
+                .unwrap_or(USUAL_DELIMITERS[0])
+        };
+        self.delimiter.unwrap_or_else(found)
     }
 
     /// Returns the mapping of a channel, if set.
@@ -304,40 +261,30 @@ fn column_and_unit(text: &str) -> Result<(Column, Option<Unit>), String> {
 #[derive(Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Entries {
-    #[serde(deserialize_with = "non_empty_value")]
-    time: Option<Scalar>,
-    #[serde(deserialize_with = "non_empty_value")]
-    psec: Option<Scalar>,
-    #[serde(deserialize_with = "non_empty_value")]
-    position: Option<Scalar>,
-    #[serde(deserialize_with = "non_empty_value")]
-    velocity: Option<Scalar>,
-    #[serde(deserialize_with = "non_empty_value")]
-    current: Option<Scalar>,
-    #[serde(deserialize_with = "non_empty_value")]
-    velocity_feedforward: Option<Scalar>,
-    #[serde(deserialize_with = "non_empty_value")]
-    torque_feedforward: Option<Scalar>,
-    #[serde(deserialize_with = "non_empty_value")]
-    motor_position: Option<Scalar>,
-    #[serde(deserialize_with = "non_empty_value")]
-    wind_up: Option<Scalar>,
-    #[serde(deserialize_with = "non_empty_value")]
-    delimiter: Option<Scalar>,
-    #[serde(deserialize_with = "non_empty_value")]
-    decimal_comma: Option<Scalar>,
-    #[serde(deserialize_with = "non_empty_value")]
-    skip_lines: Option<Scalar>,
+    time: EntryText,
+    psec: EntryText,
+    position: EntryText,
+    velocity: EntryText,
+    current: EntryText,
+    torque: EntryText,
+    velocity_feedforward: EntryText,
+    torque_feedforward: EntryText,
+    motor_position: EntryText,
+    wind_up: EntryText,
+    delimiter: EntryText,
+    decimal_comma: EntryText,
+    skip_lines: EntryText,
 }
 
 impl Entries {
-    fn into_all(self) -> impl Iterator<Item = (&'static str, Scalar)> {
+    fn into_all(self) -> impl Iterator<Item = (&'static str, String)> {
         let values = [
             self.time,
             self.psec,
             self.position,
             self.velocity,
             self.current,
+            self.torque,
             self.velocity_feedforward,
             self.torque_feedforward,
             self.motor_position,
@@ -346,44 +293,46 @@ impl Entries {
             self.decimal_comma,
             self.skip_lines,
         ];
-        keys().zip(values).filter_map(|(key, value)| Some((key, value?)))
+        keys().zip(values).filter_map(|(key, value)| Some((key, value.0?)))
     }
 }
 
-/// Deserializes the value of a key that is present; rejects an empty value.
-fn non_empty_value<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Scalar>, D::Error> {
-    deserializer.deserialize_any(ScalarVisitor).map(Some)
-}
+/// YAML scalar of any type as text; none without the key.
+#[derive(Default)]
+struct EntryText(Option<String>);
 
-/// YAML scalar of any type as text.
-struct Scalar(String);
+impl<'de> Deserialize<'de> for EntryText {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ScalarVisitor).map(|text| EntryText(Some(text)))
+    }
+}
 
 struct ScalarVisitor;
 
 impl Visitor<'_> for ScalarVisitor {
-    type Value = Scalar;
+    type Value = String;
 
     fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         f.write_str("a text (put a column number in quotation marks: \"#3[mm]\")")
     }
 
-    fn visit_str<E>(self, value: &str) -> Result<Scalar, E> {
-        Ok(Scalar(value.to_owned()))
+    fn visit_str<E>(self, value: &str) -> Result<String, E> {
+        Ok(value.to_owned())
     }
 
-    fn visit_bool<E>(self, value: bool) -> Result<Scalar, E> {
-        Ok(Scalar(value.to_string()))
+    fn visit_bool<E>(self, value: bool) -> Result<String, E> {
+        Ok(value.to_string())
     }
 
-    fn visit_u64<E>(self, value: u64) -> Result<Scalar, E> {
-        Ok(Scalar(value.to_string()))
+    fn visit_u64<E>(self, value: u64) -> Result<String, E> {
+        Ok(value.to_string())
     }
 
-    fn visit_i64<E>(self, value: i64) -> Result<Scalar, E> {
-        Ok(Scalar(value.to_string()))
+    fn visit_i64<E>(self, value: i64) -> Result<String, E> {
+        Ok(value.to_string())
     }
 
-    fn visit_unit<E: de::Error>(self) -> Result<Scalar, E> {
+    fn visit_unit<E: de::Error>(self) -> Result<String, E> {
         Err(E::custom("the value is missing; put a column number in quotation marks: \"#3[mm]\""))
     }
 }

@@ -2,31 +2,35 @@
 
 use std::io::Read;
 
-use super::error::{AxisRecordingError, MAX_ROWS};
-use super::layout::{Context, Layout, next_line, parse_number};
+use super::context::{Context, RecordingOptions};
+use super::format::{Found, MAX_ROWS, RecordingFormat};
+use super::found_column::FoundColumn;
+use super::header::detect_columns;
+use super::layout::{Layout, MAX_SEARCHED, PREAMBLE, next_line, parse_number};
 use super::recording_builder::build_recording;
+use super::recording_columns::RecordingColumns;
 use super::unit::Channel;
+use crate::files::error::{ErrorKind, FileError};
 use crate::files::lines::{Lines, fields_between};
 use virtual_axes_core::text::shortened;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 
-type Found<T> = Result<T, AxisRecordingError>;
+/// Minimum number of detected channels in a header behind other lines.
+const MIN_CHANNELS: usize = 2;
 
-/// Reads the recording of an axis from CSV.
-pub(super) fn read(input: impl Read, context: &Context) -> Found<(RawRecording, Vec<Finding>)> {
+/// Reads the recording of an axis with findings.
+pub(super) fn read(input: &mut dyn Read, context: &Context) -> Found<(RawRecording, Vec<Finding>)> {
     let Context { name, columns, .. } = *context;
     let factors = context.factors()?;
     let mut lines = Lines::new(input);
     let Some((line, text)) = first_line(&mut lines, columns.skip_lines, name)? else {
         let what =
             if columns.skip_lines > 0 { "no line after the skipped lines" } else { "the file is empty" };
-        return Err(AxisRecordingError::Empty { at: name.to_owned(), what });
+        return Err(FileError::new(name, what));
     };
-    let layout = context.layout(line, &text, &factors).map_err(|mut error| {
-        if let AxisRecordingError::NoColumn { hint, .. } = &mut error {
-            *hint = format!("{hint}{}", context.hint(line, &text, &mut lines, &factors)).into();
-        }
-        error
+    let layout = context.layout(line, &text, &factors).map_err(|error| match error.kind {
+        ErrorKind::NoColumn => error.with_hint(&context.hint(line, &text, &mut lines, &factors)),
+        _ => error,
     })?;
     let mut channels: [Vec<f64>; Channel::ALL.len()] = Default::default();
     let mut rows = 0;
@@ -38,17 +42,12 @@ pub(super) fn read(input: impl Read, context: &Context) -> Found<(RawRecording, 
     let mut last = line;
     while let Some((line, text)) = next_line(&mut lines, name)? {
         if rows == MAX_ROWS {
-            return Err(AxisRecordingError::TooLong { at: format!("{name}:{line}") });
+            return Err(FileError::too_long(format_args!("{name}:{line}")));
         }
-        let read = layout.row(name, line, text, &mut channels);
-        if let Err(mut error) = read {
-            if let AxisRecordingError::Fields { found, wanted, hint, .. } = &mut error
-                && found < wanted
-                && matches!(lines.next(), Ok(None))
-            {
-                *hint = "; this is the last line: the file is truncated";
-            }
-            return Err(error);
+        if let Err(error) = layout.row(name, line, text, &mut channels) {
+            let is_truncated = error.kind == ErrorKind::FewFields && matches!(lines.next(), Ok(None));
+            let hint = if is_truncated { "; this is the last line: the file is truncated" } else { "" };
+            return Err(error.with_hint(hint));
         }
         rows += 1;
         last = line;
@@ -56,7 +55,7 @@ pub(super) fn read(input: impl Read, context: &Context) -> Found<(RawRecording, 
     }
     if rows == 0 {
         let what = "no row below the header";
-        return Err(AxisRecordingError::Empty { at: name.to_owned(), what });
+        return Err(FileError::new(name, what));
     }
     let mut findings = Vec::new();
     if !is_ended {
@@ -68,6 +67,58 @@ pub(super) fn read(input: impl Read, context: &Context) -> Found<(RawRecording, 
     let recording =
         build_recording(context, channels, (&layout.assignment, &layout.found), rows, &mut findings)?;
     Ok((recording, findings))
+}
+
+/// Lists the columns with their detected meanings. `name` is the name of the file.
+pub(super) fn inspect(
+    input: &mut dyn Read,
+    name: &str,
+    options: &RecordingOptions,
+) -> Found<RecordingColumns> {
+    let mut lines = Lines::new(input);
+    let mut first: Option<(u64, Vec<FoundColumn>)> = None;
+    let mut header_line = None;
+    let mut searched = 0;
+    while let Some((line, text)) = next_line(&mut lines, name)? {
+        if line <= options.columns.skip_lines {
+            continue;
+        }
+        let columns = columns_of_line(text, options);
+        searched += columns.len();
+        let count = columns.iter().filter(|column| column.channel.is_some()).count();
+        match &mut first {
+            None => first = Some((line, columns)),
+            Some((_, known)) if count >= MIN_CHANNELS => {
+                *known = columns;
+                header_line = Some(line);
+            }
+            Some(_) => {}
+        }
+        let begin = first.as_ref().map_or(line, |(line, _)| *line);
+        if count > 0 || header_line.is_some() || line > begin + PREAMBLE || searched > MAX_SEARCHED {
+            break;
+        }
+    }
+    let Some((_, columns)) = first else {
+        return Err(FileError::new(name, "the file is empty"));
+    };
+    Ok(RecordingColumns { header_line, ..RecordingColumns::new(RecordingFormat::Csv, columns, false) })
+}
+
+/// Returns the columns of a line: by their headers, or by number for a line of numbers.
+fn columns_of_line(text: &str, options: &RecordingOptions) -> Vec<FoundColumn> {
+    let delimiter = options.columns.delimiter_of(text);
+    let mut fields: Vec<String> = fields_between(text, delimiter).map(str::to_owned).collect();
+    if fields.len() > 1 && fields.last().is_some_and(String::is_empty) {
+        fields.pop();
+    }
+    let is_number = |field: &String| parse_number(field, options.columns.decimal_comma).is_some();
+    if !fields.iter().all(is_number) {
+        return detect_columns(&fields);
+    }
+    let reason = "there is no header: select the column by number";
+    let numbered = fields.iter().zip(1..).map(|(_, n)| FoundColumn::unknown(n, &format!("#{n}"), reason));
+    numbered.collect()
 }
 
 /// Returns the first line that is neither blank nor skipped.
@@ -108,7 +159,7 @@ impl Layout {
             } else {
                 ""
             };
-            return Err(AxisRecordingError::Fields { at: at(), found, wanted, hint });
+            return Err(FileError::fields(at(), found, wanted, hint));
         }
         if let Some((column, index, field)) = wrong {
             let hint = match self.decimal_comma {
@@ -122,13 +173,7 @@ impl Layout {
             };
             let wanted = if index == 0 { "a finite number" } else { "a finite number, empty or NaN" };
             let column = shortened(&self.columns[column]);
-            return Err(AxisRecordingError::Number {
-                at: at(),
-                column,
-                found: shortened(field),
-                wanted,
-                hint,
-            });
+            return Err(FileError::number(at(), &column, &shortened(field), wanted, hint));
         }
         for (channel, value) in channels.iter_mut().zip(values) {
             channel.push(value);

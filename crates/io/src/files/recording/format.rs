@@ -1,96 +1,64 @@
-//! Formats of recordings, detected from the content.
+//! Formats of recordings, detected from the content, and errors that several of them share.
 
-use std::fmt;
-use std::str::FromStr;
+use std::fmt::Display;
 
-use super::{halsampler, sinumerik_edge, sinumerik_trace, twincat_header};
-use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
+use super::unit::Channel;
+use crate::files::error::{ErrorKind, FileError};
 
-/// Format of a recording of axes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RecordingFormat {
-    /// CSV with a header, or with columns selected by number.
-    Csv,
-    /// Trace of Sinumerik Operate on Sinumerik 840D sl, XML.
-    SinumerikTrace,
-    /// High-frequency data of Sinumerik Edge, JSON.
-    SinumerikEdge,
-    /// CSV exported by TwinCAT Scope.
-    TwinCatScope,
-    /// Text of LinuxCNC's halsampler.
-    Halsampler,
-    /// MCAP with ROS messages.
-    Mcap,
-}
-
-/// Error of an unknown name of a format.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown format \"{found}\"; known are {}{}", RecordingFormat::names(), nearest_hint(.nearest))]
-pub struct RecordingFormatError {
-    found: String,
-    nearest: Option<String>,
-}
-
-impl RecordingFormat {
-    /// All formats.
-    pub const ALL: [RecordingFormat; 6] = [
-        RecordingFormat::Csv,
-        RecordingFormat::SinumerikTrace,
-        RecordingFormat::SinumerikEdge,
-        RecordingFormat::TwinCatScope,
-        RecordingFormat::Halsampler,
-        RecordingFormat::Mcap,
-    ];
-
-    /// Returns the name of the format, as in the option `--format`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            RecordingFormat::Csv => "csv",
-            RecordingFormat::SinumerikTrace => "sinumerik-trace",
-            RecordingFormat::SinumerikEdge => "sinumerik-edge",
-            RecordingFormat::TwinCatScope => "twincat-scope",
-            RecordingFormat::Halsampler => "halsampler",
-            RecordingFormat::Mcap => "mcap",
-        }
-    }
-
-    fn names() -> String {
-        Self::ALL.map(Self::name).join(", ")
-    }
-
-    /// Detects the format from the first bytes of a file.
-    pub(super) fn detect(head: &[u8]) -> Self {
-        if head.starts_with(mcap::MAGIC) {
-            return RecordingFormat::Mcap;
-        }
-        let text = String::from_utf8_lossy(head);
-        if sinumerik_trace::is_sinumerik_trace(&text) {
-            RecordingFormat::SinumerikTrace
-        } else if sinumerik_edge::is_sinumerik_edge(&text) {
-            RecordingFormat::SinumerikEdge
-        } else if twincat_header::is_twincat(&text) {
-            RecordingFormat::TwinCatScope
-        } else if halsampler::is_halsampler(&text) {
-            RecordingFormat::Halsampler
-        } else {
-            RecordingFormat::Csv
-        }
+virtual_axes_core::named_values! {
+    /// Format of a recording of axes, with the names of the option `--format`.
+    pub enum RecordingFormat {
+        /// CSV with a header, or with columns selected by number.
+        Csv = "csv",
+        /// Trace of Sinumerik Operate on Sinumerik 840D sl, XML.
+        SinumerikTrace = "sinumerik-trace",
+        /// High-frequency data of Sinumerik Edge, JSON.
+        SinumerikEdge = "sinumerik-edge",
+        /// CSV exported by TwinCAT Scope.
+        TwinCatScope = "twincat-scope",
+        /// Text of LinuxCNC's halsampler.
+        Halsampler = "halsampler",
+        /// MCAP with ROS messages.
+        Mcap = "mcap",
     }
 }
 
-impl fmt::Display for RecordingFormat {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
+/// Maximum number of samples of a recording.
+pub(super) const MAX_ROWS: usize = 10_000_000;
+
+/// Result of reading a recording.
+pub(super) type Found<T> = Result<T, FileError>;
+
+impl FileError {
+    /// Creates an error of text that cannot be read.
+    pub(super) fn not_text(at: impl Display, reason: impl Display) -> Self {
+        Self::new(at, format_args!("{reason}; a recording is text in UTF-8 (CSV) or MCAP"))
     }
-}
 
-impl FromStr for RecordingFormat {
-    type Err = RecordingFormatError;
+    /// Creates an error of a recording with too many samples.
+    pub(super) fn too_long(at: impl Display) -> Self {
+        Self::new(at, format_args!("more than {MAX_ROWS} samples; split the recording"))
+    }
 
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::ALL.into_iter().find(|format| format.name() == text).ok_or_else(|| RecordingFormatError {
-            found: shortened(text),
-            nearest: nearest_name(text, Self::ALL.map(Self::name)),
-        })
+    /// Creates an error of content that contradicts the format.
+    pub(super) fn content(at: impl Display, format: RecordingFormat, reason: impl Display) -> Self {
+        Self::new(at, format_args!("not a recording of the format {format}: {reason}"))
+    }
+
+    /// Creates an error of a row with a wrong number of values.
+    pub(super) fn fields(at: impl Display, found: usize, wanted: usize, hint: &str) -> Self {
+        let kind = if found < wanted { ErrorKind::FewFields } else { ErrorKind::Content };
+        Self::new(at, format_args!("{found} values, {wanted} columns{hint}")).with_kind(kind)
+    }
+
+    /// Creates an error of a value that is not the `wanted` number.
+    pub(super) fn number(at: impl Display, column: &str, found: &str, wanted: &str, hint: &str) -> Self {
+        let reason = format_args!("{column} is \"{found}\", must be {wanted}{hint}");
+        Self::new(at, reason).with_kind(ErrorKind::Content)
+    }
+
+    /// Creates an error of a channel without values.
+    pub(super) fn no_value(at: impl Display, channel: Channel, rows: usize) -> Self {
+        Self::new(at, format_args!("{channel} has no value in any of {rows} rows"))
     }
 }

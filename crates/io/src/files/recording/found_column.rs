@@ -46,10 +46,12 @@ impl FoundColumn {
 
 /// Unit of a column: from the header, from the format, or assumed.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ColumnUnit(UnitSource);
+pub struct ColumnUnit(pub(super) UnitSource);
 
+/// Source of the unit of a column.
 #[derive(Debug, Clone, PartialEq)]
-enum UnitSource {
+pub(super) enum UnitSource {
+    /// Unit that the file states.
     Known(Unit),
     /// Units of linear and rotary axes that the format defines.
     ByKind(Unit, Unit),
@@ -57,8 +59,11 @@ enum UnitSource {
     AxisSpeed,
     /// SI unit that the format defines.
     Si(Channel),
+    /// SI unit, as the file states none.
     Assumed(Channel),
+    /// Number of samples.
     Samples,
+    /// Text that is no known unit.
     Unknown(String),
 }
 
@@ -76,34 +81,10 @@ pub(super) enum ColumnFactor {
 }
 
 impl ColumnUnit {
-    pub(super) fn known(unit: Unit) -> Self {
-        ColumnUnit(UnitSource::Known(unit))
-    }
-
     /// Returns the units with these symbols for linear and rotary axes.
     pub(super) fn by_kind(linear: &'static str, rotary: &'static str) -> Self {
         let unit = |symbol| Unit { factor: 1.0, symbol };
         ColumnUnit(UnitSource::ByKind(unit(linear), unit(rotary)))
-    }
-
-    pub(super) fn axis_speed() -> Self {
-        ColumnUnit(UnitSource::AxisSpeed)
-    }
-
-    pub(super) fn si(channel: Channel) -> Self {
-        ColumnUnit(UnitSource::Si(channel))
-    }
-
-    pub(super) fn assumed(channel: Channel) -> Self {
-        ColumnUnit(UnitSource::Assumed(channel))
-    }
-
-    pub(super) fn samples() -> Self {
-        ColumnUnit(UnitSource::Samples)
-    }
-
-    pub(super) fn unknown(text: String) -> Self {
-        ColumnUnit(UnitSource::Unknown(text))
     }
 
     /// Returns true if the file does not state the unit and SI is assumed.

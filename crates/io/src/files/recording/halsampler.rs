@@ -8,30 +8,67 @@
 
 use std::io::Read;
 
-use super::error::{AxisRecordingError, MAX_ROWS};
-use super::format::RecordingFormat;
-use super::found_column::{ColumnUnit, FoundColumn};
-use super::layout::{Context, next_line, parse_number};
+use super::context::Context;
+use super::format::{Found, MAX_ROWS, RecordingFormat};
+use super::found_column::{ColumnUnit, FoundColumn, UnitSource};
+use super::layout::{next_line, parse_number};
 use super::recording_builder::{ChannelValues, build_recording};
+use super::recording_columns::RecordingColumns;
 use super::unit::Channel;
+use crate::files::error::FileError;
 use crate::files::lines::Lines;
 use virtual_axes_core::text::shortened;
 use virtual_axes_identify::recording::{Finding, RawRecording};
-
-type Found<T> = Result<T, AxisRecordingError>;
 
 /// Line that states lost samples.
 const OVERRUN: &str = "overrun";
 /// Number of lines that decide whether the first column is the sample number.
 const TAGGED_LINES: usize = 3;
 
-/// Returns true if the first line of values consists of at least two numbers separated by spaces.
-pub(super) fn is_halsampler(text: &str) -> bool {
-    let mut lines = text.lines().filter(|line| !line.trim().is_empty() && line.trim() != OVERRUN);
+/// Returns true if a text file that begins with `head` has the format.
+pub(super) fn detects(head: &str) -> bool {
+    let mut lines = head.lines().filter(|line| !line.trim().is_empty() && line.trim() != OVERRUN);
     lines.next().is_some_and(|line| {
         let is_number = |field: &str| parse_number(field, false).is_some_and(f64::is_finite);
         !line.contains('\t') && line.split_whitespace().count() > 1 && line.split_whitespace().all(is_number)
     })
+}
+
+/// Lists the columns with their detected meanings. `name` is the name of the file.
+pub(super) fn inspect(input: &mut dyn Read, name: &str) -> Found<RecordingColumns> {
+    let columns = Head::read(&mut Lines::new(input), name)?.columns;
+    Ok(RecordingColumns::new(RecordingFormat::Halsampler, columns, false))
+}
+
+/// Reads the recording of an axis with findings.
+pub(super) fn read(input: &mut dyn Read, context: &Context) -> Found<(RawRecording, Vec<Finding>)> {
+    let name = context.name;
+    let mut lines = Lines::new(input);
+    let head = Head::read(&mut lines, name)?;
+    let line = head.lines.first().map_or(1, |(line, _)| *line);
+    let assignment = context.assign_found(&head.columns, &|| format!("{name}:{line}"))?;
+    let mut rows = Rows {
+        name,
+        slots: &assignment.slots,
+        is_tagged: head.columns.first().is_some_and(|column| column.channel.is_some()),
+        channels: ChannelValues::default(),
+        count: 0,
+        overruns: 0,
+    };
+    for (line, text) in &head.lines {
+        rows.add(*line, text)?;
+    }
+    while let Some((line, text)) = next_line(&mut lines, name)? {
+        rows.add(line, text)?;
+    }
+    let mut findings = Vec::new();
+    if rows.overruns > 0 {
+        let what = format!("{name}: samples are missing; lines with \"overrun\": {}", rows.overruns);
+        findings.push(Finding::warning("overrun", what, "increase the depth of the FIFO of sampler"));
+    }
+    let Rows { channels, count, .. } = rows;
+    let recording = build_recording(context, channels, (&assignment, &head.columns), count, &mut findings)?;
+    Ok((recording, findings))
 }
 
 /// Lines at the start of a file, and the meanings of its columns.
@@ -53,7 +90,7 @@ impl Head {
         let values: Vec<&str> =
             first.iter().map(|(_, text)| text.trim()).filter(|text| *text != OVERRUN).collect();
         let Some(columns) = values.first().map(|text| text.split_whitespace().count()) else {
-            return Err(AxisRecordingError::Empty { at: name.to_owned(), what: "the file is empty" });
+            return Err(FileError::new(name, "the file is empty"));
         };
         let columns = describe(columns, is_tagged(&values));
         Ok(Head { lines: first, columns })
@@ -84,48 +121,11 @@ fn describe(count: usize, is_tagged: bool) -> Vec<FoundColumn> {
     let mut columns: Vec<FoundColumn> = (1 + usize::from(is_tagged)..=count).map(pin).collect();
     if is_tagged {
         let mut tag = FoundColumn::unknown(1, "#1", "sample number (halsampler -t): it counts the lines");
-        (tag.channel, tag.unit, tag.is_secondary) = (Some(Channel::Time), Some(ColumnUnit::samples()), true);
+        (tag.channel, tag.unit, tag.is_secondary) =
+            (Some(Channel::Time), Some(ColumnUnit(UnitSource::Samples)), true);
         columns.insert(0, tag);
     }
     columns
-}
-
-/// Returns the columns of a file.
-pub(super) fn inspect(input: impl Read, name: &str) -> Found<Vec<FoundColumn>> {
-    Ok(Head::read(&mut Lines::new(input), name)?.columns)
-}
-
-/// Reads the recording of an axis, whose columns are selected by number.
-pub(super) fn read(input: impl Read, context: &Context) -> Found<(RawRecording, Vec<Finding>)> {
-    let name = context.name;
-    let factors = context.factors()?;
-    let mut lines = Lines::new(input);
-    let head = Head::read(&mut lines, name)?;
-    let headers: Vec<String> = head.columns.iter().map(|column| column.header.clone()).collect();
-    let line = head.lines.first().map_or(1, |(line, _)| *line);
-    let assignment = context.assign(&headers, &head.columns, &|| format!("{name}:{line}"), &factors)?;
-    let mut rows = Rows {
-        name,
-        slots: &assignment.slots,
-        is_tagged: head.columns.first().is_some_and(|column| column.channel.is_some()),
-        channels: ChannelValues::default(),
-        count: 0,
-        overruns: 0,
-    };
-    for (line, text) in &head.lines {
-        rows.add(*line, text)?;
-    }
-    while let Some((line, text)) = next_line(&mut lines, name)? {
-        rows.add(line, text)?;
-    }
-    let mut findings = Vec::new();
-    if rows.overruns > 0 {
-        let what = format!("{name}: samples are missing; lines with \"overrun\": {}", rows.overruns);
-        findings.push(Finding::warning("overrun", what, "increase the depth of the FIFO of sampler"));
-    }
-    let Rows { channels, count, .. } = rows;
-    let recording = build_recording(context, channels, (&assignment, &head.columns), count, &mut findings)?;
-    Ok((recording, findings))
 }
 
 /// Values read so far.
@@ -146,34 +146,25 @@ impl Rows<'_> {
             if self.count > 0 && !self.is_tagged {
                 let reason = "samples are missing at \"overrun\", and their number is unknown; record with the option \
                               -t of halsampler, or increase the depth of the FIFO of sampler";
-                return Err(AxisRecordingError::Content {
-                    at: at(),
-                    format: RecordingFormat::Halsampler,
-                    reason: reason.to_owned(),
-                });
+                return Err(FileError::content(at(), RecordingFormat::Halsampler, reason));
             }
             self.overruns += usize::from(self.count > 0);
             return Ok(());
         }
         if self.count == MAX_ROWS {
-            return Err(AxisRecordingError::TooLong { at: at() });
+            return Err(FileError::too_long(at()));
         }
         let found = text.split_whitespace().count();
         if found != self.slots.len() {
-            return Err(AxisRecordingError::Fields { at: at(), found, wanted: self.slots.len(), hint: "" });
+            return Err(FileError::fields(at(), found, self.slots.len(), ""));
         }
         let mut values = [f64::NAN; Channel::ALL.len()];
         for (column, (field, slot)) in text.split_whitespace().zip(self.slots).enumerate() {
             let Some((index, factor)) = *slot else { continue };
             let value = parse_number(field, false).filter(|value| value.is_finite() || index > 0);
             let (Some(value), Some(target)) = (value, values.get_mut(index)) else {
-                return Err(AxisRecordingError::Number {
-                    at: at(),
-                    column: format!("#{}", column + 1),
-                    found: shortened(field),
-                    wanted: "a number",
-                    hint: "",
-                });
+                let column = format!("#{}", column + 1);
+                return Err(FileError::number(at(), &column, &shortened(field), "a number", ""));
             };
             *target = factor * value;
         }

@@ -1,16 +1,19 @@
 //! Detection of channel, unit and axis from the words of a header: `Actual position X (mm)`, `pos_x_mm`,
 //! `Lageistwert [mm]`.
 
-use super::found_column::{ColumnUnit, FoundColumn};
+use super::found_column::{ColumnUnit, FoundColumn, UnitSource};
 use super::header_unit::{HeaderUnit, split_brackets};
+use super::sinumerik_signal::{edge_signal, trace_signal};
 use super::unit::{Channel, Unit};
 use super::vocabulary::{HeaderQuantity, WordMeaning, announces_axis, axis_name, compound, meaning};
 
 /// Maximum length of a header whose words are searched, bytes.
 const MAX_HEADER: usize = 300;
+/// Maximum number of columns whose headers are interpreted.
+const MAX_COLUMNS: usize = 1000;
 
 /// Takes the position of a motor for that of its axis if the columns have no other one.
-pub(super) fn resolve_motor_positions(columns: &mut [FoundColumn]) {
+fn resolve_motor_positions(columns: &mut [FoundColumn]) {
     let positions = columns.iter().filter(|column| column.channel == Some(Channel::Position));
     let axes: Vec<Option<String>> = positions.map(|column| column.axis.clone()).collect();
     for column in columns {
@@ -39,6 +42,21 @@ struct Facts {
     is_behind_encoder: bool,
 }
 
+/// Returns the meanings of columns from their headers.
+pub(super) fn detect_columns(headers: &[String]) -> Vec<FoundColumn> {
+    let of = |(text, number): (&String, usize)| {
+        if number > MAX_COLUMNS {
+            return FoundColumn::unknown(number, text, "behind the first 1000 columns");
+        }
+        let signal = edge_signal(number, text).or_else(|| trace_signal(number, text));
+        signal.unwrap_or_else(|| detect(number, text))
+    };
+    let mut columns: Vec<FoundColumn> = headers.iter().zip(1..).map(of).collect();
+    resolve_axis_a(&mut columns);
+    resolve_motor_positions(&mut columns);
+    columns
+}
+
 /// Returns the meaning of a column from its header.
 pub(super) fn detect(number: usize, header: &str) -> FoundColumn {
     if header.len() > MAX_HEADER {
@@ -63,7 +81,7 @@ pub(super) fn detect(number: usize, header: &str) -> FoundColumn {
 }
 
 /// Relates `current_A` to an axis `a` if other columns name that axis.
-pub(super) fn resolve_axis_a(columns: &mut [FoundColumn]) {
+fn resolve_axis_a(columns: &mut [FoundColumn]) {
     let has_axis_a = columns.iter().any(|column| column.axis.as_deref() == Some("a"));
     let others = columns.iter().filter(|column| column.channel == Some(Channel::Current)).count();
     if !has_axis_a || others < 2 {
@@ -73,7 +91,7 @@ pub(super) fn resolve_axis_a(columns: &mut [FoundColumn]) {
         let is_bare = column.channel == Some(Channel::Current) && column.axis.is_none();
         if is_bare && column.header.ends_with('A') {
             column.axis = Some("a".to_owned());
-            column.unit = Some(ColumnUnit::assumed(Channel::Current));
+            column.unit = Some(ColumnUnit(UnitSource::Assumed(Channel::Current)));
         }
     }
 }
@@ -298,10 +316,10 @@ impl Facts {
                 column.channel = Some(channel);
                 column.reason = format!("{} in the header", self.quoted());
                 column.unit = Some(match unit {
-                    _ if is_counter => ColumnUnit::samples(),
-                    HeaderUnit::Missing => ColumnUnit::assumed(channel),
-                    HeaderUnit::Known(unit) => ColumnUnit::known(unit),
-                    HeaderUnit::Unknown(text) => ColumnUnit::unknown(text),
+                    _ if is_counter => ColumnUnit(UnitSource::Samples),
+                    HeaderUnit::Missing => ColumnUnit(UnitSource::Assumed(channel)),
+                    HeaderUnit::Known(unit) => ColumnUnit(UnitSource::Known(unit)),
+                    HeaderUnit::Unknown(text) => ColumnUnit(UnitSource::Unknown(text)),
                 });
                 // A torque is used if there is no current.
                 column.is_secondary = is_counter

@@ -5,18 +5,17 @@ use std::io::{Read, Seek};
 
 use mcap::McapError;
 
-use super::error::AxisRecordingError;
+use super::format::{Found, MAX_ROWS};
 use super::join::{TargetStamps, TimeSource};
 use super::recording_builder::motor_position;
 use super::series::{MessageKind, Row, Series};
+use super::unit::Channel;
+use crate::files::error::{FileError, shorten_names};
 use crate::files::mcap_reader::{Completeness, check_chunks, parse_error, read_messages, type_of};
-use crate::files::shorten_names;
 use virtual_axes_core::config::AxisConfig;
-use virtual_axes_core::text::nearest_name;
+use virtual_axes_core::text::{nearest_hint, nearest_name};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_identify::recording::{Finding, RawRecording};
-
-type Found<T> = Result<T, AxisRecordingError>;
 
 /// Topics of a recording: all with their message types, and the relevant ones by kind.
 #[derive(Debug, Default)]
@@ -71,8 +70,8 @@ pub(super) fn read(
         if let Some(series) = selected.iter_mut().find(of) {
             rows += series.add(&message, name, joint, is_full_name)?;
         }
-        if rows > super::error::MAX_ROWS {
-            return Err(AxisRecordingError::TooLong { at: name.to_owned() });
+        if rows > MAX_ROWS {
+            return Err(FileError::too_long(name));
         }
     }
     join_series(selected, name, axis, joint, &mut findings).map(|recording| (recording, findings))
@@ -92,7 +91,6 @@ impl Contents {
 
     /// Selects the series to read; the source of positions comes first.
     fn choose(mut self, name: &str, named: &[String], findings: &mut Vec<Finding>) -> Found<Vec<Series>> {
-        let at = || name.to_owned();
         for topics in self.relevant.values_mut() {
             topics.sort();
         }
@@ -106,11 +104,14 @@ impl Contents {
             match chosen.as_slice() {
                 [] => Ok(None),
                 [topic] => Ok(Some(Series::new(kind, topic))),
-                topics => Err(AxisRecordingError::SeveralTopics {
-                    at: at(),
-                    kind: kind.name(),
-                    topics: shorten_names(topics.iter().copied()),
-                }),
+                topics => {
+                    let reason = format!(
+                        "several topics carry {}, {}: select one by its name or a prefix of it",
+                        kind.name(),
+                        shorten_names(topics.iter().copied()).join(", ")
+                    );
+                    Err(FileError::new(name, reason))
+                }
             }
         };
         let currents = one(MessageKind::MotorCurrents)?;
@@ -126,11 +127,13 @@ impl Contents {
             let found: Vec<String> =
                 self.all.iter().map(|(topic, kind)| format!("{topic} ({kind})")).collect();
             let found = shorten_names(&found);
-            return Err(AxisRecordingError::NoMessages {
-                at: at(),
-                wanted: format!("{} or {}", MessageKind::DriveStates.name(), MessageKind::JointState.name()),
-                found: if found.is_empty() { "none at all".to_owned() } else { found.join(", ") },
-            });
+            let reason = format!(
+                "there is no message of type {} or {}; there are {}",
+                MessageKind::DriveStates.name(),
+                MessageKind::JointState.name(),
+                if found.is_empty() { "none at all".to_owned() } else { found.join(", ") }
+            );
+            return Err(FileError::new(name, reason));
         }
         if let (None, Some(topics)) = (&currents, self.relevant.get(&MessageKind::MotorCurrents)) {
             let what = format!("{name}: the motor currents on {} are not selected", topics.join(", "));
@@ -145,12 +148,12 @@ impl Contents {
         let all = || self.relevant.values().flatten();
         for topic in named {
             if !all().any(|found| is_in_namespace(found, topic)) && all().next().is_some() {
-                return Err(AxisRecordingError::UnknownTopic {
-                    at: name.to_owned(),
-                    topic: topic.clone(),
-                    topics: shorten_names(all()),
-                    nearest: nearest_name(topic, all().map(String::as_str)),
-                });
+                let reason = format!(
+                    "no message of an axis on {topic}; there are some on {}{}",
+                    shorten_names(all()).join(", "),
+                    nearest_hint(&nearest_name(topic, all().map(String::as_str)))
+                );
+                return Err(FileError::new(name, reason));
             }
         }
         Ok(())
@@ -241,8 +244,7 @@ fn base_recording(
         recording.motor_position = both.and_then(|(load, wind_up)| motor_position(load, &wind_up));
     }
     if recording.position.is_none() {
-        let (channel, rows) = (super::Channel::Position, rows.len());
-        return Err(AxisRecordingError::NoValue { at: name.to_owned(), channel, rows });
+        return Err(FileError::no_value(name, Channel::Position, rows.len()));
     }
     Ok(recording)
 }

@@ -3,19 +3,19 @@
 mod assignment;
 mod axis_match;
 mod columns;
+mod context;
 mod csv;
-mod error;
 mod format;
 mod found_column;
 mod halsampler;
 mod header;
 mod header_unit;
-mod inspect;
 mod join;
 mod layout;
 mod line_counter;
 mod mcap;
 mod recording_builder;
+mod recording_columns;
 mod series;
 mod sinumerik_edge;
 mod sinumerik_signal;
@@ -30,73 +30,55 @@ use std::fs::File;
 use std::io::{Cursor, Read, Seek};
 use std::path::Path;
 
-pub use columns::{Columns, ColumnsError};
-pub use error::AxisRecordingError;
-pub use format::{RecordingFormat, RecordingFormatError};
+pub use columns::Columns;
+pub use context::RecordingOptions;
+pub use format::RecordingFormat;
 pub use found_column::{ColumnUnit, FoundColumn};
-pub use inspect::{RecordingColumns, inspect_recording, inspect_recording_stream};
+pub use recording_columns::RecordingColumns;
 pub use unit::Channel;
 
+use super::error::{ErrorKind, FileError};
 use super::input::{FileKind, Input};
-use layout::Context;
+use format::Found;
 use virtual_axes_core::config::AxisConfig;
 use virtual_axes_identify::recording::{Finding, RawRecording};
-
-/// Options of reading a recording. The defaults fit traces and recordings of this package.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct RecordingOptions {
-    /// Column mapping and format of CSV files.
-    pub columns: Columns,
-    /// Topics of MCAP recordings, or prefixes of their names (`/mill`), if several topics have the same type.
-    pub topics: Vec<String>,
-    /// Full name of the joint, or the name or number of the axis in the file; default is the name of the axis, with or
-    /// without a prefix.
-    pub joint: Option<String>,
-    /// Format of the file; detected from the content if `None`.
-    pub format: Option<RecordingFormat>,
-    /// Sampling rate, Hz, of a file without a column of time.
-    pub rate_hz: Option<f64>,
-}
 
 /// Number of bytes that determine the format of a file.
 const HEAD_BYTES: u64 = 1 << 16;
 
-impl RecordingOptions {
-    fn joint<'a>(&'a self, axis: &'a AxisConfig) -> &'a str {
-        self.joint.as_deref().unwrap_or(&axis.name)
-    }
+/// Recording of one axis with the findings of reading it.
+type Recording = (RawRecording, Vec<Finding>);
 
-    fn context<'a>(&'a self, name: &'a str, axis: &'a AxisConfig) -> Result<Context<'a>, AxisRecordingError> {
-        if let Some(found) = self.rate_hz.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
-            return Err(AxisRecordingError::Rate { found });
+/// Function that returns true if a text file with these first characters has a format.
+type Detection = fn(&str) -> bool;
+
+impl RecordingFormat {
+    /// Returns the format of a file with the given first bytes.
+    fn detect(head: &[u8]) -> Self {
+        if head.starts_with(::mcap::MAGIC) {
+            return RecordingFormat::Mcap;
         }
-        Ok(Context {
-            name,
-            axis,
-            joint: self.joint(axis),
-            is_joint_given: self.joint.is_some(),
-            columns: &self.columns,
-            rate: self.rate_hz,
-        })
+        let text = String::from_utf8_lossy(head);
+        let of_controls: [(Self, Detection); 4] = [
+            (RecordingFormat::SinumerikTrace, sinumerik_trace::detects),
+            (RecordingFormat::SinumerikEdge, sinumerik_edge::detects),
+            (RecordingFormat::TwinCatScope, twincat::detects),
+            (RecordingFormat::Halsampler, halsampler::detects),
+        ];
+        let found = of_controls.into_iter().find(|(_, detects)| detects(&text));
+        found.map_or(RecordingFormat::Csv, |(format, _)| format)
     }
 }
 
-/// Opens a file and reads its first bytes.
-fn open(path: &Path, name: &str) -> Result<(Vec<u8>, File), AxisRecordingError> {
-    let mut file = File::open(path).map_err(|error| unreadable(name, &error))?;
-    let head = read_head(&mut file, name)?;
-    Ok((head, file))
-}
-
-/// Reads the first bytes of a file.
-fn read_head(input: &mut impl Read, name: &str) -> Result<Vec<u8>, AxisRecordingError> {
+/// Reads the first bytes of a file, and returns them with the format that is given or detected.
+fn read_head(
+    input: &mut dyn Read,
+    name: &str,
+    options: &RecordingOptions,
+) -> Found<(RecordingFormat, Vec<u8>)> {
     let mut head = Vec::new();
-    input.take(HEAD_BYTES).read_to_end(&mut head).map_err(|error| unreadable(name, &error))?;
-    Ok(head)
-}
-
-fn unreadable(name: &str, error: &std::io::Error) -> AxisRecordingError {
-    AxisRecordingError::Unreadable { at: name.to_owned(), reason: error.to_string() }
+    input.take(HEAD_BYTES).read_to_end(&mut head).map_err(|error| FileError::new(name, error))?;
+    Ok((options.format.unwrap_or_else(|| RecordingFormat::detect(&head)), head))
 }
 
 /// Reads the recording of one axis with its findings; the format is detected from the content.
@@ -104,31 +86,31 @@ fn unreadable(name: &str, error: &std::io::Error) -> AxisRecordingError {
 /// The axis determines the allowed units and the conversion from torque to current.
 ///
 /// # Errors
-/// Returns an [`AxisRecordingError`] for the first error in the file.
+/// Returns a [`FileError`] for the first error in the file.
 pub fn read_recording(
     path: &Path,
     axis: &AxisConfig,
     options: &RecordingOptions,
-) -> Result<(RawRecording, Vec<Finding>), AxisRecordingError> {
+) -> Result<(RawRecording, Vec<Finding>), FileError> {
     let name = path.display().to_string();
-    let (head, file) = open(path, &name)?;
-    let format = options.format.unwrap_or_else(|| RecordingFormat::detect(&head));
-    if format == RecordingFormat::Mcap {
-        let (recording, mut findings) = read_recording_mcap(file, &name, axis, options)?;
-        findings.extend(unused_options(&name, format, options));
-        return Ok((recording, findings));
-    }
-    let read = read_stream(head, file, &name, axis, options).map(|(recording, mut findings)| {
-        findings.extend(unused_options(&name, format, options));
-        (recording, findings)
-    });
-    if format != RecordingFormat::Csv {
-        return read;
-    }
-    read.map_err(|error| match detect_other_kind(path, &error) {
-        Some(kind) => AxisRecordingError::OtherKind { at: name.clone(), kind },
-        None => error,
-    })
+    let mut file = File::open(path).map_err(|error| FileError::new(&name, error))?;
+    let (format, head) = read_head(&mut file, &name, options)?;
+    let (recording, mut findings) = match format {
+        RecordingFormat::Mcap => read_recording_mcap(file, &name, axis, options)?,
+        _ => read_stream((format, head), file, &name, axis, options).map_err(|error| {
+            match detect_other_kind(path, &error).filter(|_| format == RecordingFormat::Csv) {
+                Some(kind) => FileError::new(
+                    &name,
+                    format_args!(
+                        "the file is {kind}, must be a recording (CSV with columns of time and position, or MCAP)"
+                    ),
+                ),
+                None => error,
+            }
+        })?,
+    };
+    findings.extend(unused_options(&name, format, options));
+    Ok((recording, findings))
 }
 
 /// Returns findings about the options that the format does not use.
@@ -157,53 +139,67 @@ fn unused_options(name: &str, format: RecordingFormat, options: &RecordingOption
 /// Reads the recording of one axis from a stream of any format but MCAP. `name` is the file name in errors.
 ///
 /// # Errors
-/// Returns an [`AxisRecordingError`] for the first error in the stream.
+/// Returns a [`FileError`] for the first error in the stream.
 pub fn read_recording_stream(
     mut input: impl Read,
     name: &str,
     axis: &AxisConfig,
     options: &RecordingOptions,
-) -> Result<(RawRecording, Vec<Finding>), AxisRecordingError> {
-    let head = read_head(&mut input, name)?;
+) -> Result<(RawRecording, Vec<Finding>), FileError> {
+    let head = read_head(&mut input, name, options)?;
     read_stream(head, input, name, axis, options)
 }
 
 /// Reads the recording from a stream after its first bytes.
 fn read_stream(
-    head: Vec<u8>,
+    (format, head): (RecordingFormat, Vec<u8>),
     rest: impl Read,
     name: &str,
     axis: &AxisConfig,
     options: &RecordingOptions,
-) -> Result<(RawRecording, Vec<Finding>), AxisRecordingError> {
-    let context = options.context(name, axis)?;
-    let format = options.format.unwrap_or_else(|| RecordingFormat::detect(&head));
-    let input = Cursor::new(head).chain(rest);
+) -> Found<Recording> {
+    let (input, context) = (&mut Cursor::new(head).chain(rest), &options.context(name, axis)?);
     match format {
-        RecordingFormat::Csv => csv::read(input, &context),
-        RecordingFormat::SinumerikTrace => sinumerik_trace::read(input, &context),
-        RecordingFormat::SinumerikEdge => sinumerik_edge::read(input, &context),
-        RecordingFormat::TwinCatScope => twincat::read(input, &context),
-        RecordingFormat::Halsampler => halsampler::read(input, &context),
-        RecordingFormat::Mcap => Err(AxisRecordingError::Content {
-            at: name.to_owned(),
-            format,
-            reason: "MCAP is read from a file, not from a stream".to_owned(),
-        }),
+        RecordingFormat::Csv => csv::read(input, context),
+        RecordingFormat::SinumerikTrace => sinumerik_trace::read(input, context),
+        RecordingFormat::SinumerikEdge => sinumerik_edge::read(input, context),
+        RecordingFormat::TwinCatScope => twincat::read(input, context),
+        RecordingFormat::Halsampler => halsampler::read(input, context),
+        RecordingFormat::Mcap => {
+            Err(FileError::content(name, format, "MCAP is read from a file, not from a stream"))
+        }
     }
 }
 
-/// Reads the recording of one axis from CSV. `name` is the file name in errors.
+/// Lists the columns of a file with their detected meanings; the format is detected from the content.
 ///
 /// # Errors
-/// Returns an [`AxisRecordingError`] for the first error in the file.
-pub fn read_recording_csv(
-    input: impl Read,
+/// Returns a [`FileError`] if the file cannot be read, or contradicts its format.
+pub fn inspect_recording(path: &Path, options: &RecordingOptions) -> Result<RecordingColumns, FileError> {
+    let name = path.display().to_string();
+    let file = File::open(path).map_err(|error| FileError::new(&name, error))?;
+    inspect_recording_stream(file, &name, options)
+}
+
+/// Lists the columns of a stream. `name` is the file name in errors.
+///
+/// # Errors
+/// Those of [`inspect_recording`].
+pub fn inspect_recording_stream(
+    mut input: impl Read,
     name: &str,
-    axis: &AxisConfig,
     options: &RecordingOptions,
-) -> Result<(RawRecording, Vec<Finding>), AxisRecordingError> {
-    csv::read(input, &options.context(name, axis)?)
+) -> Result<RecordingColumns, FileError> {
+    let (format, head) = read_head(&mut input, name, options)?;
+    let input = &mut Cursor::new(head).chain(input);
+    match format {
+        RecordingFormat::Csv => csv::inspect(input, name, options),
+        RecordingFormat::SinumerikTrace => sinumerik_trace::inspect(input, name),
+        RecordingFormat::SinumerikEdge => sinumerik_edge::inspect(input, name),
+        RecordingFormat::TwinCatScope => twincat::inspect(input, name),
+        RecordingFormat::Halsampler => halsampler::inspect(input, name),
+        RecordingFormat::Mcap => Ok(RecordingColumns::new(format, Vec::new(), true)),
+    }
 }
 
 /// Reads the recording of one axis from MCAP. `name` is the file name in errors.
@@ -212,26 +208,20 @@ pub fn read_recording_csv(
 /// `virtual_axes/msg/MotorCurrents` or else from the effort of the joint states. Time starts at the first message.
 ///
 /// # Errors
-/// Returns an [`AxisRecordingError`] for the first error in the file.
+/// Returns a [`FileError`] for the first error in the file.
 pub fn read_recording_mcap(
     input: impl Read + Seek,
     name: &str,
     axis: &AxisConfig,
     options: &RecordingOptions,
-) -> Result<(RawRecording, Vec<Finding>), AxisRecordingError> {
+) -> Result<(RawRecording, Vec<Finding>), FileError> {
     mcap::read(input, name, axis, (options.joint(axis), options.joint.is_some()), &options.topics)
 }
 
 /// Detects the kind of a file that is not CSV of an axis.
-fn detect_other_kind(path: &Path, error: &AxisRecordingError) -> Option<FileKind> {
-    let by_content = matches!(
-        error,
-        AxisRecordingError::NoColumn { .. }
-            | AxisRecordingError::Fields { .. }
-            | AxisRecordingError::Number { .. }
-    );
+fn detect_other_kind(path: &Path, error: &FileError) -> Option<FileKind> {
     // A pipe cannot be read twice.
-    if !by_content || !path.metadata().is_ok_and(|data| data.is_file()) {
+    if error.kind == ErrorKind::Other || !path.metadata().is_ok_and(|data| data.is_file()) {
         return None;
     }
     match Input::open(path).ok()?.kind() {

@@ -1,10 +1,11 @@
 //! Construction of a recording from the values of its channels.
 
 use super::assignment::ColumnAssignment;
-use super::error::AxisRecordingError;
+use super::context::Context;
+use super::format::Found;
 use super::found_column::{ColumnUnit, FoundColumn};
-use super::layout::Context;
 use super::unit::Channel;
+use crate::files::error::FileError;
 use virtual_axes_core::text::shortened;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 
@@ -19,7 +20,7 @@ pub(super) fn build_recording(
     (assignment, found): (&ColumnAssignment, &[FoundColumn]),
     rows: usize,
     findings: &mut Vec<Finding>,
-) -> Result<RawRecording, AxisRecordingError> {
+) -> Found<RawRecording> {
     let name = context.name;
     assignment.report(context, found, findings);
     let mut recording = RawRecording { name: name.to_owned(), ..RawRecording::default() };
@@ -28,7 +29,7 @@ pub(super) fn build_recording(
         let Some(column) = assignment.column_of(index) else { continue };
         if values.iter().all(|value| value.is_nan()) {
             if channel.is_required() {
-                return Err(AxisRecordingError::NoValue { at: name.to_owned(), channel, rows });
+                return Err(FileError::no_value(name, channel, rows));
             }
             let column = found.get(column).map_or_else(String::new, |column| shortened(&column.header));
             let what = format!("{name}: column {column} ({channel}) has no values and is ignored");
@@ -41,15 +42,43 @@ pub(super) fn build_recording(
             Channel::Position => recording.position = Some(values),
             Channel::Velocity => recording.velocity = Some(values),
             Channel::Current => recording.current = Some(values),
+            Channel::Torque => recording.torque = Some(values),
             Channel::VelocityFeedforward => recording.velocity_feedforward = Some(values),
             Channel::TorqueFeedforward => recording.torque_feedforward = Some(values),
             Channel::MotorPosition => recording.motor_position = Some(values),
             Channel::WindUp => wind_up = Some(values),
         }
     }
+    if recording.current.is_none()
+        && let Some(torque) = recording.torque.take()
+    {
+        let constant = context.axis.motor.torque_constant;
+        recording.current = Some(torque.iter().map(|torque| torque / constant).collect());
+    }
     recording.motor_position =
         recording.motor_position.or_else(|| motor_position(recording.position.as_ref()?, &wind_up?));
     set_time(context, assignment, found, rows, findings, &mut recording);
+    Ok(recording)
+}
+
+/// Creates the recording from the values of its channels at times that the format states; `source` names them.
+///
+/// # Errors
+/// A required channel without values.
+pub(super) fn build_timed_recording(
+    context: &Context,
+    channels: ChannelValues,
+    columns: (&ColumnAssignment, &[FoundColumn]),
+    (times, source): (Vec<f64>, &str),
+    findings: &mut Vec<Finding>,
+) -> Found<RawRecording> {
+    if context.rate.is_some() {
+        let what = format!("{}: --rate-hz is not used: the times are those of the {source}", context.name);
+        findings.push(Finding::note("unused-rate", what));
+    }
+    let context = Context { rate: None, ..*context };
+    let mut recording = build_recording(&context, channels, columns, times.len(), findings)?;
+    recording.time = times;
     Ok(recording)
 }
 

@@ -5,27 +5,29 @@ use std::collections::{BTreeMap, BTreeSet};
 use mcap::Message;
 use serde::Deserialize;
 
-use super::error::AxisRecordingError;
+use crate::files::error::FileError;
 use crate::files::mcap_reader::decode;
 use crate::messages::builtin_interfaces::msg::Time;
 use crate::messages::sensor_msgs::msg::JointState;
 use crate::messages::std_msgs::msg::Header;
 use crate::messages::{DriveStates, MotorCurrents};
-use virtual_axes_core::text::{nearest_name, shortened};
+use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 use virtual_axes_core::units::{Nanoseconds, SECOND_NS, seconds};
 
 /// Maximum number of joints in an error message.
 const MAX_NAMES: usize = 60;
 
-/// Message types with values of an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum MessageKind {
-    /// `sensor_msgs/msg/JointState`.
-    JointState,
-    /// `virtual_axes/msg/MotorCurrents`.
-    MotorCurrents,
-    /// `virtual_axes/msg/DriveStates`.
-    DriveStates,
+virtual_axes_core::named_values! {
+    /// Message types with values of an axis, with their ROS names.
+    #[derive(PartialOrd, Ord)]
+    pub(super) enum MessageKind {
+        /// Positions, velocities and efforts.
+        JointState = "sensor_msgs/msg/JointState",
+        /// Currents of the motors.
+        MotorCurrents = "virtual_axes/msg/MotorCurrents",
+        /// Signals of the drives.
+        DriveStates = "virtual_axes/msg/DriveStates",
+    }
 }
 
 impl MessageKind {
@@ -45,22 +47,6 @@ impl MessageKind {
     pub const WIND_UP: usize = 5;
     /// Index of the current in a row of motor currents.
     pub const CURRENT: usize = 0;
-
-    /// Returns the ROS name of the type.
-    pub const fn name(self) -> &'static str {
-        match self {
-            MessageKind::JointState => "sensor_msgs/msg/JointState",
-            MessageKind::MotorCurrents => "virtual_axes/msg/MotorCurrents",
-            MessageKind::DriveStates => "virtual_axes/msg/DriveStates",
-        }
-    }
-
-    /// Returns the kind with this ROS type name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        [MessageKind::JointState, MessageKind::MotorCurrents, MessageKind::DriveStates]
-            .into_iter()
-            .find(|k| k.name() == name)
-    }
 
     fn decode(self, message: &Message<'_>) -> Result<Decoded, String> {
         Ok(match self {
@@ -148,24 +134,21 @@ impl Series {
     /// Adds a message and returns the number of rows added.
     ///
     /// # Errors
-    /// Returns [`AxisRecordingError::Message`] if the message cannot be decoded.
+    /// Returns an error if the message cannot be decoded.
     pub fn add(
         &mut self,
         message: &Message<'_>,
         file: &str,
         joint: &str,
         is_full_name: bool,
-    ) -> Result<usize, AxisRecordingError> {
+    ) -> Result<usize, FileError> {
         let number = self.messages;
         self.messages += 1;
         let log_time = Nanoseconds::try_from(message.log_time).unwrap_or(Nanoseconds::MAX);
-        self.add_rows(message, log_time, joint, is_full_name).map_err(|reason| AxisRecordingError::Message {
-            at: format!(
-                "{file}: {}, message {number}, log time {} s",
-                shortened(&self.topic),
-                seconds(log_time)
-            ),
-            reason,
+        self.add_rows(message, log_time, joint, is_full_name).map_err(|reason| {
+            let (topic, time) = (shortened(&self.topic), seconds(log_time));
+            let at = format!("{file}: {topic}, message {number}, log time {time} s");
+            FileError::new(at, reason)
         })
     }
 
@@ -220,13 +203,13 @@ impl Series {
     /// whose name ends in `joint`.
     ///
     /// # Errors
-    /// Returns [`AxisRecordingError::Joint`] if the joint does not exist or is ambiguous.
+    /// Returns an error if the joint does not exist or is ambiguous.
     pub fn into_rows(
         mut self,
         file: &str,
         joint: &str,
         preferred: Option<&str>,
-    ) -> Result<(String, Vec<Row>), AxisRecordingError> {
+    ) -> Result<(String, Vec<Row>), FileError> {
         for name in preferred.into_iter().chain([joint]) {
             if let Some(rows) = self.candidates.remove(name) {
                 return Ok((name.to_owned(), rows));
@@ -245,12 +228,10 @@ impl Series {
             true => ("several joints end in", None),
             false => ("there is no joint", nearest_name(joint, names.iter().map(|name| name.as_str()))),
         };
-        Err(AxisRecordingError::Joint {
-            at: format!("{file}: {}", shortened(&self.topic)),
-            reason,
-            joint: joint.to_owned(),
-            joints: names.iter().map(|name| shortened(name)).collect(),
-            nearest,
-        })
+        let names: Vec<String> = names.iter().map(|name| shortened(name)).collect();
+        Err(FileError::new(
+            format_args!("{file}: {}", shortened(&self.topic)),
+            format_args!("{reason} {joint}; there are {}{}", names.join(", "), nearest_hint(&nearest)),
+        ))
     }
 }

@@ -12,28 +12,49 @@ use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::assignment::ColumnAssignment;
-use super::error::{AxisRecordingError, MAX_ROWS};
-use super::format::RecordingFormat;
+use super::context::Context;
+use super::format::{Found, MAX_ROWS, RecordingFormat};
 use super::found_column::FoundColumn;
-use super::layout::Context;
 use super::recording_builder::{ChannelValues, build_recording};
+use super::recording_columns::RecordingColumns;
 use super::sinumerik_signal::edge_signal;
 use super::unit::Channel;
+use crate::files::error::FileError;
 use virtual_axes_core::text::shortened;
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::recording::{Finding, RawRecording};
-
-type Found<T> = Result<T, AxisRecordingError>;
 
 /// Key of the list of signals, by which the format is detected.
 const SIGNALS: &str = "SignalListHFData";
 /// Maximum number of signals.
 const MAX_SIGNALS: usize = 10_000;
 
-/// Returns true for JSON with a list of high-frequency signals.
-pub(super) fn is_sinumerik_edge(text: &str) -> bool {
-    text.trim_start_matches('\u{feff}').trim_start().starts_with('{')
-        && text.contains(&format!("\"{SIGNALS}\""))
+/// Returns true if a text file that begins with `head` has the format.
+pub(super) fn detects(head: &str) -> bool {
+    head.trim_start_matches('\u{feff}').trim_start().starts_with('{')
+        && head.contains(&format!("\"{SIGNALS}\""))
+}
+
+/// Lists the columns with their detected meanings. `name` is the name of the file.
+pub(super) fn inspect(input: &mut dyn Read, name: &str) -> Found<RecordingColumns> {
+    let mut document = Document::new(None);
+    document.parse(input, name)?;
+    let is_periodic = document.rate.is_some();
+    Ok(RecordingColumns::new(RecordingFormat::SinumerikEdge, document.columns, is_periodic))
+}
+
+/// Reads the recording of an axis with findings.
+pub(super) fn read(input: &mut dyn Read, context: &Context) -> Found<(RawRecording, Vec<Finding>)> {
+    let mut document = Document::new(Some(*context));
+    document.parse(input, context.name)?;
+    let Document { columns, assignment, channels, rows, rate, .. } = document;
+    if rows == 0 {
+        return Err(FileError::new(context.name, "there are no rows of HFData in the Payload"));
+    }
+    let mut findings = Vec::new();
+    let context = Context { rate, ..*context };
+    let recording = build_recording(&context, channels, (&assignment, &columns), rows, &mut findings)?;
+    Ok((recording, findings))
 }
 
 /// Header of a recording.
@@ -93,31 +114,9 @@ struct Document<'a> {
     rows: usize,
     rate: Option<f64>,
     /// Error that is no syntax error.
-    error: Option<AxisRecordingError>,
+    error: Option<FileError>,
     /// True after the header if only the header is read.
     is_done: bool,
-}
-
-/// Returns the columns of a recording, and true if it states its period.
-pub(super) fn inspect(input: impl Read, name: &str) -> Found<(Vec<FoundColumn>, bool)> {
-    let mut document = Document::new(None);
-    document.parse(input, name)?;
-    Ok((document.columns, document.rate.is_some()))
-}
-
-/// Reads the recording of an axis.
-pub(super) fn read(input: impl Read, context: &Context) -> Found<(RawRecording, Vec<Finding>)> {
-    let mut document = Document::new(Some(*context));
-    document.parse(input, context.name)?;
-    let Document { columns, assignment, channels, rows, rate, .. } = document;
-    if rows == 0 {
-        let what = "there are no rows of HFData in the Payload";
-        return Err(AxisRecordingError::Empty { at: context.name.to_owned(), what });
-    }
-    let mut findings = Vec::new();
-    let context = Context { rate, ..*context };
-    let recording = build_recording(&context, channels, (&assignment, &columns), rows, &mut findings)?;
-    Ok((recording, findings))
 }
 
 impl<'a> Document<'a> {
@@ -136,7 +135,8 @@ impl<'a> Document<'a> {
 
     fn parse(&mut self, input: impl Read, name: &str) -> Found<()> {
         let mut json = serde_json::Deserializer::from_reader(BufReader::new(input));
-        let outcome = json.deserialize_map(DocumentVisitor(self)).and_then(|()| json.end());
+        let outcome =
+            json.deserialize_map(Node { document: self, level: Level::Document }).and_then(|()| json.end());
         let Err(error) = outcome else { return Ok(()) };
         if self.is_done {
             return Ok(());
@@ -145,16 +145,13 @@ impl<'a> Document<'a> {
             return Err(error);
         }
         if error.is_io() {
-            return Err(AxisRecordingError::Unreadable {
-                at: name.to_owned(),
-                reason: shortened(&error.to_string()),
-            });
+            return Err(FileError::new(name, shortened(&error.to_string())));
         }
         let text = error.to_string();
         let position = format!(" at line {} column {}", error.line(), error.column());
         let reason = shortened(text.strip_suffix(&position).unwrap_or(&text));
         let at = format!("{name}:{}", error.line());
-        Err(AxisRecordingError::Content { at, format: RecordingFormat::SinumerikEdge, reason })
+        Err(FileError::content(at, RecordingFormat::SinumerikEdge, reason))
     }
 
     /// Assigns the columns of the header to channels.
@@ -170,11 +167,7 @@ impl<'a> Document<'a> {
         };
         self.rate = context.rate.or(header.rate());
         context.rate = self.rate;
-        let headers: Vec<String> = self.columns.iter().map(|column| column.header.clone()).collect();
-        let at = || context.name.to_owned();
-        let assigned =
-            context.factors().and_then(|factors| context.assign(&headers, &self.columns, &at, &factors));
-        match assigned {
+        match context.assign_found(&self.columns, &|| context.name.to_owned()) {
             Ok(assignment) => self.assignment = assignment,
             Err(error) => {
                 self.error = Some(error);
@@ -210,112 +203,83 @@ impl<'a> Document<'a> {
     }
 }
 
-/// Visitor of the whole document.
-struct DocumentVisitor<'s, 'a>(&'s mut Document<'a>);
+/// Part of the document.
+#[derive(Clone, Copy)]
+enum Level {
+    Document,
+    Payload,
+    Item,
+    Rows,
+}
 
-impl<'de> Visitor<'de> for DocumentVisitor<'_, '_> {
+/// Visitor of a part of the document.
+struct Node<'s, 'a> {
+    document: &'s mut Document<'a>,
+    level: Level,
+}
+
+impl<'de> DeserializeSeed<'de> for Node<'_, '_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        match self.level {
+            Level::Document | Level::Item => deserializer.deserialize_map(self),
+            Level::Payload | Level::Rows => deserializer.deserialize_seq(self),
+        }
+    }
+}
+
+impl<'de> Visitor<'de> for Node<'_, '_> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("an object with Header and Payload")
+        f.write_str(match self.level {
+            Level::Document => "an object with Header and Payload",
+            Level::Payload => "a list of objects as Payload",
+            Level::Item => "an object in the Payload",
+            Level::Rows => "rows of numbers as HFData",
+        })
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+        let Node { document, level } = self;
         let mut has_header = false;
         while let Some(key) = map.next_key::<String>()? {
-            match key.as_str() {
-                "Header" if has_header => return Err(A::Error::custom("there are two Headers")),
-                "Header" => {
+            match (level, key.as_str()) {
+                (Level::Document, "Header") if has_header => {
+                    return Err(A::Error::custom("there are two Headers"));
+                }
+                (Level::Document, "Header") => {
                     let header: EdgeHeader = map.next_value()?;
-                    self.0.set_header(&header).map_err(A::Error::custom)?;
+                    document.set_header(&header).map_err(A::Error::custom)?;
                     has_header = true;
                 }
-                "Payload" if has_header => map.next_value_seed(Payload(&mut *self.0))?,
-                "Payload" => return Err(A::Error::custom("the Payload is in front of the Header")),
+                (Level::Document, "Payload") if has_header => {
+                    map.next_value_seed(Node { document: &mut *document, level: Level::Payload })?;
+                }
+                (Level::Document, "Payload") => {
+                    return Err(A::Error::custom("the Payload is in front of the Header"));
+                }
+                (Level::Item, "HFData") => {
+                    map.next_value_seed(Node { document: &mut *document, level: Level::Rows })?;
+                }
                 _ => _ = map.next_value::<IgnoredAny>()?,
             }
         }
-        if !has_header {
+        if matches!(level, Level::Document) && !has_header {
             return Err(A::Error::custom("there is no Header with SignalListHFData"));
         }
         Ok(())
     }
-}
-
-/// List of data and events.
-struct Payload<'s, 'a>(&'s mut Document<'a>);
-
-/// Item of the list: an object whose `HFData` are rows.
-struct PayloadItem<'s, 'a>(&'s mut Document<'a>);
-
-/// Rows of values.
-struct HighFrequencyRows<'s, 'a>(&'s mut Document<'a>);
-
-impl<'de> DeserializeSeed<'de> for Payload<'_, '_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
-        deserializer.deserialize_seq(self)
-    }
-}
-
-impl<'de> Visitor<'de> for Payload<'_, '_> {
-    type Value = ();
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("a list of objects as Payload")
-    }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<(), A::Error> {
-        while items.next_element_seed(PayloadItem(&mut *self.0))?.is_some() {}
-        Ok(())
-    }
-}
-
-impl<'de> DeserializeSeed<'de> for PayloadItem<'_, '_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
-        deserializer.deserialize_map(self)
-    }
-}
-
-impl<'de> Visitor<'de> for PayloadItem<'_, '_> {
-    type Value = ();
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("an object in the Payload")
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
-        while let Some(key) = map.next_key::<String>()? {
-            match key.as_str() {
-                "HFData" => map.next_value_seed(HighFrequencyRows(&mut *self.0))?,
-                _ => _ = map.next_value::<IgnoredAny>()?,
-            }
+        let Node { document, level } = self;
+        if matches!(level, Level::Payload) {
+            while items.next_element_seed(Node { document: &mut *document, level: Level::Item })?.is_some() {}
+            return Ok(());
         }
-        Ok(())
-    }
-}
-
-impl<'de> DeserializeSeed<'de> for HighFrequencyRows<'_, '_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
-        deserializer.deserialize_seq(self)
-    }
-}
-
-impl<'de> Visitor<'de> for HighFrequencyRows<'_, '_> {
-    type Value = ();
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("rows of numbers as HFData")
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut rows: A) -> Result<(), A::Error> {
-        while let Some(row) = rows.next_element::<Vec<Option<f64>>>()? {
-            self.0.add(&row).map_err(A::Error::custom)?;
+        while let Some(row) = items.next_element::<Vec<Option<f64>>>()? {
+            document.add(&row).map_err(A::Error::custom)?;
         }
         Ok(())
     }

@@ -8,7 +8,7 @@
 //! `Tav23362_2140_frenata_15_4_26_EmgTest.xml` in <https://github.com/hailongchenn/sinumerik-trace-viewer>, in which
 //! position, velocity and acceleration of a rotary axis agree in degrees, 1/min and degrees per s².
 
-use super::found_column::{ColumnUnit, FoundColumn};
+use super::found_column::{ColumnUnit, FoundColumn, UnitSource};
 use super::unit::Channel;
 
 /// Number of the cycle of the position controller.
@@ -18,7 +18,7 @@ pub(super) const CYCLE: &str = "CYCLE";
 pub(super) fn edge_signal(number: usize, header: &str) -> Option<FoundColumn> {
     let mut column = FoundColumn::unknown(number, header, "");
     if header == CYCLE {
-        (column.channel, column.unit) = (Some(Channel::Time), Some(ColumnUnit::samples()));
+        (column.channel, column.unit) = (Some(Channel::Time), Some(ColumnUnit(UnitSource::Samples)));
         column.is_secondary = true;
         column.reason = "CYCLE of Sinumerik: number of the position cycle".to_owned();
         return Some(column);
@@ -34,17 +34,23 @@ pub(super) fn edge_signal(number: usize, header: &str) -> Option<FoundColumn> {
         "ENC_POS" => (Some(Channel::Position), length(), "position of the active encoder"),
         "ENC1_POS" => (Some(Channel::Position), length(), "position of encoder 1, if there is no ENC_POS"),
         "ENC2_POS" => (Some(Channel::Position), length(), "position of encoder 2, if there is no ENC_POS"),
-        "CURRENT" => (Some(Channel::Current), Some(ColumnUnit::si(Channel::Current)), "current of the motor"),
-        "TORQUE" => (
+        "CURRENT" => (
             Some(Channel::Current),
-            Some(ColumnUnit::by_kind("N.m", "N.m")),
-            "torque, if there is no CURRENT",
+            Some(ColumnUnit(UnitSource::Si(Channel::Current))),
+            "current of the motor",
         ),
-        "VEL_FFW" => {
-            (Some(Channel::VelocityFeedforward), Some(ColumnUnit::axis_speed()), "velocity feedforward")
-        }
+        "TORQUE" => (
+            Some(Channel::Torque),
+            Some(ColumnUnit::by_kind("N.m", "N.m")),
+            "torque of the motor; with CURRENT it tells the torque constant, without it the current",
+        ),
+        "VEL_FFW" => (
+            Some(Channel::VelocityFeedforward),
+            Some(ColumnUnit(UnitSource::AxisSpeed)),
+            "velocity feedforward",
+        ),
         "TORQUE_FFW" => {
-            let unit = ColumnUnit::si(Channel::TorqueFeedforward);
+            let unit = ColumnUnit(UnitSource::Si(Channel::TorqueFeedforward));
             (Some(Channel::TorqueFeedforward), Some(unit), "torque or force feedforward")
         }
         "CTRL_POS" => (None, None, "setpoint behind the filters of the position controller, PSEC is DES_POS"),
@@ -54,7 +60,7 @@ pub(super) fn edge_signal(number: usize, header: &str) -> Option<FoundColumn> {
         _ => return None,
     };
     (column.channel, column.unit) = (channel, unit);
-    column.is_secondary = matches!(name, "ENC1_POS" | "ENC2_POS" | "TORQUE");
+    column.is_secondary = matches!(name, "ENC1_POS" | "ENC2_POS");
     column.reason = format!("{name} of Sinumerik: {what}");
     Some(column)
 }
@@ -98,9 +104,11 @@ pub(super) fn trace_signal(number: usize, header: &str) -> Option<FoundColumn> {
             length(),
             "position of measuring system 2, if there is none of the servo data",
         ),
-        "nckServoDataActCurr" => {
-            (Some(Channel::Current), Some(ColumnUnit::si(Channel::Current)), "torque-producing current")
-        }
+        "nckServoDataActCurr" => (
+            Some(Channel::Current),
+            Some(ColumnUnit(UnitSource::Si(Channel::Current))),
+            "torque-producing current",
+        ),
         "nckServoDataActVelMot" | "nckServoDataActVelMotorSide" => (
             None,
             None,

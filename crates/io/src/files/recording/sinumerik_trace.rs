@@ -13,19 +13,19 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
 use super::assignment::ColumnAssignment;
-use super::error::{AxisRecordingError, MAX_ROWS};
-use super::format::RecordingFormat;
+use super::context::Context;
+use super::format::{Found, MAX_ROWS, RecordingFormat};
 use super::found_column::FoundColumn;
-use super::layout::Context;
 use super::line_counter::LineCounter;
-use super::recording_builder::{ChannelValues, build_recording};
+use super::recording_builder::{ChannelValues, build_timed_recording};
+use super::recording_columns::RecordingColumns;
 use super::sinumerik_signal::trace_signal;
 use super::trace_samples::TraceSamples;
 use super::unit::Channel;
+use crate::files::error::FileError;
 use virtual_axes_core::text::shortened;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 
-type Found<T> = Result<T, AxisRecordingError>;
 type Xml<R> = Reader<LineCounter<BufReader<R>>>;
 
 /// Root element.
@@ -39,9 +39,50 @@ const MISSING: f64 = 9.218_868_437_227_4e18;
 const SAMPLES_PER_RECORD: usize = 100;
 const FREE_SAMPLES: usize = 100_000;
 
-/// Returns true for the XML of a trace.
-pub(super) fn is_sinumerik_trace(text: &str) -> bool {
-    text.trim_start_matches('\u{feff}').trim_start().starts_with('<') && text.contains(&format!("<{ROOT}"))
+/// Returns true if a text file that begins with `head` has the format.
+pub(super) fn detects(head: &str) -> bool {
+    head.trim_start_matches('\u{feff}').trim_start().starts_with('<') && head.contains(&format!("<{ROOT}"))
+}
+
+/// Lists the columns with their detected meanings. `name` is the name of the file.
+pub(super) fn inspect(input: &mut dyn Read, name: &str) -> Found<RecordingColumns> {
+    let mut frame = Frame::new(name, None);
+    frame.read(input)?;
+    Ok(RecordingColumns::new(RecordingFormat::SinumerikTrace, frame.columns, true))
+}
+
+/// Reads the recording of an axis with findings.
+pub(super) fn read(input: &mut dyn Read, context: &Context) -> Found<(RawRecording, Vec<Finding>)> {
+    let name = context.name;
+    let mut frame = Frame::new(name, Some(*context));
+    frame.read(input)?;
+    let Frame { columns, assignment, samples, last_time, mut findings, rows, .. } = frame;
+    let is_position = |index: usize| Channel::ALL.get(index) == Some(&Channel::Position);
+    let position = samples.iter().find(|(index, ..)| is_position(*index)).map(|(.., samples)| samples);
+    let limit = rows.saturating_mul(SAMPLES_PER_RECORD).saturating_add(FREE_SAMPLES).min(MAX_ROWS);
+    let times = match position.map(|samples| samples.times(last_time, limit)) {
+        Some(Ok(times)) => times,
+        Some(Err(count)) => {
+            let reason = format!(
+                "{rows} rec and the interval of the position give {count:.1e} samples, more than {limit}; record with \
+                 less time at rest"
+            );
+            return Err(frame_error(name, reason));
+        }
+        None => Vec::new(),
+    };
+    let Some(assignment) = assignment.filter(|_| !times.is_empty()) else {
+        return Err(FileError::no_value(name, Channel::Position, 0));
+    };
+    let mut channels = ChannelValues::default();
+    for (index, factor, samples) in &samples {
+        if let Some(channel) = channels.get_mut(*index) {
+            *channel = samples.values(&times).into_iter().map(|value| factor * value).collect();
+        }
+    }
+    let columns = (&assignment, columns.as_slice());
+    let recording = build_timed_recording(context, channels, columns, (times, "trace"), &mut findings)?;
+    Ok((recording, findings))
 }
 
 /// Signal of a trace.
@@ -68,55 +109,8 @@ struct Frame<'a> {
     findings: Vec<Finding>,
 }
 
-/// Returns the columns of a trace: its signals.
-pub(super) fn inspect(input: impl Read, name: &str) -> Found<Vec<FoundColumn>> {
-    let mut frame = Frame::new(name, None);
-    frame.read(input)?;
-    Ok(frame.columns)
-}
-
-/// Reads the recording of an axis.
-pub(super) fn read(input: impl Read, context: &Context) -> Found<(RawRecording, Vec<Finding>)> {
-    let name = context.name;
-    let mut frame = Frame::new(name, Some(*context));
-    frame.read(input)?;
-    let Frame { columns, assignment, samples, last_time, mut findings, rows, .. } = frame;
-    let is_position = |index: usize| Channel::ALL.get(index) == Some(&Channel::Position);
-    let position = samples.iter().find(|(index, ..)| is_position(*index)).map(|(.., samples)| samples);
-    let limit = rows.saturating_mul(SAMPLES_PER_RECORD).saturating_add(FREE_SAMPLES).min(MAX_ROWS);
-    let times = match position.map(|samples| samples.times(last_time, limit)) {
-        Some(Ok(times)) => times,
-        Some(Err(count)) => {
-            let reason = format!(
-                "{rows} rec and the interval of the position give {count:.1e} samples, more than {limit}; record with \
-                 less time at rest"
-            );
-            return Err(frame_error(name, reason));
-        }
-        None => Vec::new(),
-    };
-    let Some(assignment) = assignment.filter(|_| !times.is_empty()) else {
-        return Err(AxisRecordingError::NoValue { at: name.to_owned(), channel: Channel::Position, rows: 0 });
-    };
-    let mut channels = ChannelValues::default();
-    for (index, factor, samples) in &samples {
-        if let Some(channel) = channels.get_mut(*index) {
-            *channel = samples.values(&times).into_iter().map(|value| factor * value).collect();
-        }
-    }
-    if context.rate.is_some() {
-        let what = format!("{name}: --rate-hz is not used: the times are those of the trace");
-        findings.push(Finding::note("unused-rate", what));
-    }
-    let context = Context { rate: None, ..*context };
-    let rows = times.len();
-    let mut recording = build_recording(&context, channels, (&assignment, &columns), rows, &mut findings)?;
-    recording.time = times;
-    Ok((recording, findings))
-}
-
-fn frame_error(at: &str, reason: String) -> AxisRecordingError {
-    AxisRecordingError::Content { at: at.to_owned(), format: RecordingFormat::SinumerikTrace, reason }
+fn frame_error(at: &str, reason: String) -> FileError {
+    FileError::content(at, RecordingFormat::SinumerikTrace, reason)
 }
 
 impl<'a> Frame<'a> {
@@ -134,7 +128,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    fn error(&self, line: u64, reason: String) -> AxisRecordingError {
+    fn error(&self, line: u64, reason: String) -> FileError {
         frame_error(&format!("{}:{line}", self.name), reason)
     }
 
@@ -248,11 +242,10 @@ impl<'a> Frame<'a> {
     /// Assigns the signals to channels, once.
     fn assign(&mut self, line: u64) -> Found<()> {
         let (Some(context), None) = (self.context, &self.assignment) else { return Ok(()) };
-        let headers: Vec<String> = self.columns.iter().map(|column| column.header.clone()).collect();
         // The times are those of the trace.
         let untimed = Context { rate: Some(1.0), ..context };
         let at = || format!("{}:{line}", context.name);
-        let assignment = untimed.assign(&headers, &self.columns, &at, &context.factors()?)?;
+        let assignment = untimed.assign_found(&self.columns, &at)?;
         for (signal, slot) in self.signals.iter().zip(&assignment.slots) {
             if let Some((index, factor)) = *slot {
                 self.samples.push((index, factor, TraceSamples::new(signal.id.clone(), signal.interval)));
@@ -265,7 +258,7 @@ impl<'a> Frame<'a> {
     /// Adds the values of a time.
     fn record(&mut self, element: &BytesStart, line: u64) -> Found<()> {
         if self.rows == MAX_ROWS {
-            return Err(AxisRecordingError::TooLong { at: format!("{}:{line}", self.name) });
+            return Err(FileError::too_long(format_args!("{}:{line}", self.name)));
         }
         let mut time = None;
         let mut values: Vec<(usize, f64)> = Vec::new();
@@ -316,12 +309,9 @@ impl<'a> Frame<'a> {
 
     fn number(&self, key: &str, value: &str, line: u64) -> Found<f64> {
         let number = value.trim().parse().ok().filter(|number: &f64| number.is_finite());
-        number.ok_or_else(|| AxisRecordingError::Number {
-            at: format!("{}:{line}", self.name),
-            column: shortened(key),
-            found: shortened(value),
-            wanted: "a finite number",
-            hint: "",
+        number.ok_or_else(|| {
+            let at = format_args!("{}:{line}", self.name);
+            FileError::number(at, &shortened(key), &shortened(value), "a finite number", "")
         })
     }
 }

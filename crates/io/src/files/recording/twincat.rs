@@ -11,18 +11,18 @@
 use std::io::Read;
 
 use super::assignment::ColumnAssignment;
-use super::error::{AxisRecordingError, MAX_ROWS};
-use super::found_column::FoundColumn;
-use super::layout::{Context, next_line};
-use super::recording_builder::{ChannelValues, build_recording};
-use super::twincat_header::{ScopeHeader, number};
+use super::context::Context;
+use super::format::{Found, MAX_ROWS, RecordingFormat};
+use super::layout::next_line;
+use super::recording_builder::{ChannelValues, build_timed_recording};
+use super::recording_columns::RecordingColumns;
+use super::twincat_header::{ScopeHeader, is_twincat, number};
 use super::unit::Channel;
+use crate::files::error::FileError;
 use crate::files::lines::Lines;
 use virtual_axes_core::text::shortened;
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::recording::{Finding, RawRecording};
-
-type Found<T> = Result<T, AxisRecordingError>;
 
 /// Last line of a file.
 const END: &str = "EOF";
@@ -31,25 +31,19 @@ const MIN_FILE_TIME: i64 = 100_000_000_000_000_000;
 /// Period of file times, s.
 const FILE_TIME: f64 = 100e-9;
 
-/// Returns the columns of an export.
-pub(super) fn inspect(input: impl Read, name: &str) -> Found<Vec<FoundColumn>> {
-    Ok(ScopeHeader::read(&mut Lines::new(input), name)?.columns)
+/// Returns true if a text file that begins with `head` has the format.
+pub(super) fn detects(head: &str) -> bool {
+    is_twincat(head)
 }
 
-/// Values of a channel over time.
-#[derive(Debug, Default)]
-struct ScopeSeries {
-    /// Index of the channel in [`Channel::ALL`].
-    channel: usize,
-    factor: f64,
-    column: usize,
-    time_column: usize,
-    times: Vec<f64>,
-    values: Vec<f64>,
+/// Lists the columns with their detected meanings. `name` is the name of the file.
+pub(super) fn inspect(input: &mut dyn Read, name: &str) -> Found<RecordingColumns> {
+    let columns = ScopeHeader::read(&mut Lines::new(input), name)?.columns;
+    Ok(RecordingColumns::new(RecordingFormat::TwinCatScope, columns, true))
 }
 
-/// Reads the recording of an axis.
-pub(super) fn read(input: impl Read, context: &Context) -> Found<(RawRecording, Vec<Finding>)> {
+/// Reads the recording of an axis with findings.
+pub(super) fn read(input: &mut dyn Read, context: &Context) -> Found<(RawRecording, Vec<Finding>)> {
     let name = context.name;
     let mut lines = Lines::new(input);
     let header = ScopeHeader::read(&mut lines, name)?;
@@ -73,24 +67,27 @@ pub(super) fn read(input: impl Read, context: &Context) -> Found<(RawRecording, 
         }
     }
     if times.is_empty() {
-        let rows = 0;
-        return Err(AxisRecordingError::NoValue { at: name.to_owned(), channel: Channel::Position, rows });
+        return Err(FileError::no_value(name, Channel::Position, 0));
     }
-    if context.rate.is_some() {
-        let what = format!("{name}: --rate-hz is not used: the times are those of the export");
-        findings.push(Finding::note("unused-rate", what));
-    }
-    let context = Context { rate: None, ..*context };
-    let rows = times.len();
-    let mut recording =
-        build_recording(&context, channels, (&assignment, &header.columns), rows, &mut findings)?;
-    recording.time = times;
+    let columns = (&assignment, header.columns.as_slice());
+    let recording = build_timed_recording(context, channels, columns, (times, "export"), &mut findings)?;
     Ok((recording, findings))
+}
+
+/// Values of a channel over time.
+#[derive(Debug, Default)]
+struct ScopeSeries {
+    /// Index of the channel in [`Channel::ALL`].
+    channel: usize,
+    factor: f64,
+    column: usize,
+    time_column: usize,
+    times: Vec<f64>,
+    values: Vec<f64>,
 }
 
 /// Assigns the columns of values to channels; times are those of the groups.
 fn assign(context: &Context, header: &ScopeHeader) -> Found<ColumnAssignment> {
-    let headers: Vec<String> = header.columns.iter().map(|column| column.header.clone()).collect();
     let mut columns = header.columns.clone();
     for column in columns.iter_mut().filter(|column| column.channel == Some(Channel::Time)) {
         column.channel = None;
@@ -98,7 +95,7 @@ fn assign(context: &Context, header: &ScopeHeader) -> Found<ColumnAssignment> {
     let at = || format!("{}:{}", context.name, header.line);
     // A time is not required.
     let untimed = Context { rate: Some(1.0), ..*context };
-    untimed.assign(&headers, &columns, &at, &context.factors()?)
+    untimed.assign_found(&columns, &at)
 }
 
 fn series(header: &ScopeHeader, assignment: &ColumnAssignment) -> Vec<ScopeSeries> {
@@ -149,20 +146,14 @@ impl Table<'_> {
         if surplus.iter().any(|field| !field.is_empty()) {
             let hint =
                 if delimiter == ',' { "; export with another separator than the decimal mark" } else { "" };
-            return Err(AxisRecordingError::Fields { at: at(), found: fields.len(), wanted, hint });
+            return Err(FileError::fields(at(), fields.len(), wanted, hint));
         }
         let field =
             |column: usize| fields.get(column).copied().filter(|field| !field.is_empty() && *field != END);
-        let wrong = |column: usize, found: &str| AxisRecordingError::Number {
-            at: at(),
-            column: self
-                .header
-                .columns
-                .get(column)
-                .map_or_else(String::new, |column| shortened(&column.header)),
-            found: shortened(found),
-            wanted: "a finite number or empty",
-            hint: "",
+        let wrong = |column: usize, found: &str| {
+            let column = self.header.columns.get(column);
+            let header = column.map_or_else(String::new, |column| shortened(&column.header));
+            FileError::number(at(), &header, &shortened(found), "a finite number or empty", "")
         };
         for series in &mut self.series {
             let Some(time) = field(series.time_column) else { continue };
@@ -178,7 +169,7 @@ impl Table<'_> {
                 Some(text) => number(text, delimiter).ok_or_else(|| wrong(series.column, text))?,
             };
             if series.times.len() == MAX_ROWS {
-                return Err(AxisRecordingError::TooLong { at: at() });
+                return Err(FileError::too_long(at()));
             }
             series.times.push(time);
             series.values.push(series.factor * value);

@@ -2,16 +2,14 @@
 
 use std::io::Read;
 
-use super::error::AxisRecordingError;
-use super::format::RecordingFormat;
-use super::found_column::{ColumnUnit, FoundColumn};
+use super::format::{Found, RecordingFormat};
+use super::found_column::{ColumnUnit, FoundColumn, UnitSource};
 use super::header;
 use super::layout::next_line;
 use super::unit::{Channel, Unit};
+use crate::files::error::FileError;
 use crate::files::lines::Lines;
 use virtual_axes_core::text::shortened;
-
-type Found<T> = Result<T, AxisRecordingError>;
 
 /// Key of the line with the names of the channels, and of the first line.
 const NAME: &str = "Name";
@@ -64,10 +62,8 @@ struct MetadataLine {
 impl ScopeHeader {
     /// Reads the header up to the first line of values.
     pub fn read(lines: &mut Lines<impl Read>, name: &str) -> Found<Self> {
-        let wrong = |line: u64, reason: &str| AxisRecordingError::Content {
-            at: format!("{name}:{line}"),
-            format: RecordingFormat::TwinCatScope,
-            reason: reason.to_owned(),
+        let wrong = |line: u64, reason: &str| {
+            FileError::content(format_args!("{name}:{line}"), RecordingFormat::TwinCatScope, reason)
         };
         let mut delimiter = None;
         let mut metadata: Vec<MetadataLine> = Vec::new();
@@ -95,7 +91,7 @@ impl ScopeHeader {
             }
             metadata.push(MetadataLine { number: line, fields });
         }
-        Err(AxisRecordingError::Empty { at: name.to_owned(), what: "there are no lines of values" })
+        Err(FileError::new(name, "there are no lines of values"))
     }
 
     fn new(delimiter: char, metadata: &[MetadataLine], first: (u64, String)) -> Option<Self> {
@@ -173,7 +169,7 @@ fn time_column(number: usize) -> FoundColumn {
     let reason = "time of the columns behind it, up to the next column of times";
     let mut column = FoundColumn::unknown(number, NAME, reason);
     let millisecond = Unit { factor: 1.0, symbol: "ms" };
-    (column.channel, column.unit) = (Some(Channel::Time), Some(ColumnUnit::known(millisecond)));
+    (column.channel, column.unit) = (Some(Channel::Time), Some(ColumnUnit(UnitSource::Known(millisecond))));
     column
 }
 

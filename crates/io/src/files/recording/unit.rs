@@ -6,63 +6,34 @@ use virtual_axes_core::config::{AxisConfig, AxisKind};
 use virtual_axes_core::text::shortened;
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER, MILLISECOND, MINUTE, RPM};
 
-/// Channels of a recording of an axis, as in [`RawRecording`](virtual_axes_identify::recording::RawRecording).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Channel {
-    /// Time stamp.
-    Time,
-    /// Position setpoint at the entrance of the controller.
-    Psec,
-    /// Actual position.
-    Position,
-    /// Actual velocity of the axis.
-    Velocity,
-    /// Motor current.
-    Current,
-    /// Velocity feedforward (VFFWS).
-    VelocityFeedforward,
-    /// Torque feedforward (TFFWS).
-    TorqueFeedforward,
-    /// Position of the motor at the axis, beside that of the load.
-    MotorPosition,
-    /// Position of the motor at the axis minus that of the load.
-    WindUp,
+virtual_axes_core::named_values! {
+    /// Channels of a recording of an axis, as in [`RawRecording`](virtual_axes_identify::recording::RawRecording), with
+    /// the names in column mappings. Only time and position are required.
+    pub enum Channel {
+        /// Time stamp.
+        Time = "time",
+        /// Position setpoint at the entrance of the controller.
+        Psec = "psec",
+        /// Actual position.
+        Position = "position",
+        /// Actual velocity of the axis.
+        Velocity = "velocity",
+        /// Motor current.
+        Current = "current",
+        /// Motor torque, beside the current.
+        Torque = "torque",
+        /// Velocity feedforward (VFFWS).
+        VelocityFeedforward = "velocity_feedforward",
+        /// Torque feedforward (TFFWS).
+        TorqueFeedforward = "torque_feedforward",
+        /// Position of the motor at the axis, beside that of the load.
+        MotorPosition = "motor_position",
+        /// Position of the motor at the axis minus that of the load.
+        WindUp = "wind_up",
+    }
 }
 
 impl Channel {
-    /// All channels. Only time and position are required.
-    pub const ALL: [Channel; 9] = [
-        Channel::Time,
-        Channel::Psec,
-        Channel::Position,
-        Channel::Velocity,
-        Channel::Current,
-        Channel::VelocityFeedforward,
-        Channel::TorqueFeedforward,
-        Channel::MotorPosition,
-        Channel::WindUp,
-    ];
-
-    /// Returns the name in column mappings.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Channel::Time => "time",
-            Channel::Psec => "psec",
-            Channel::Position => "position",
-            Channel::Velocity => "velocity",
-            Channel::Current => "current",
-            Channel::VelocityFeedforward => "velocity_feedforward",
-            Channel::TorqueFeedforward => "torque_feedforward",
-            Channel::MotorPosition => "motor_position",
-            Channel::WindUp => "wind_up",
-        }
-    }
-
-    /// Returns the channel with this name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|channel| channel.name() == name)
-    }
-
     /// Returns true if every recording must have the channel.
     pub(super) fn is_required(self) -> bool {
         matches!(self, Channel::Time | Channel::Position)
@@ -78,6 +49,7 @@ impl Channel {
             Channel::Velocity => &["m/s", "mm/s", "m/min", "mm/min", "rad/s", "deg/s", "deg/min", "rpm"],
             Channel::VelocityFeedforward => &["rad/s", "rpm", "m/s", "mm/s", "m/min", "mm/min"],
             Channel::Current => &["A", "mA", "N.m", "N"],
+            Channel::Torque => &["N.m", "N"],
             Channel::TorqueFeedforward => &["N.m", "N", "A", "mA"],
         }
     }
@@ -90,7 +62,7 @@ impl Channel {
             Channel::Velocity => "m/s or rad/s",
             Channel::Current => "A",
             Channel::VelocityFeedforward => "rad/s of the motor",
-            Channel::TorqueFeedforward => "N.m",
+            Channel::Torque | Channel::TorqueFeedforward => "N.m",
         }
     }
 
@@ -129,14 +101,9 @@ impl Channel {
                 }
                 units
             }
+            Channel::Torque => torques,
             Channel::TorqueFeedforward => [torques, scaled(&CURRENTS, constant)].concat(),
         }
-    }
-}
-
-impl fmt::Display for Channel {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
     }
 }
 

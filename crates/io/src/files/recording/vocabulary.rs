@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
+use super::axis_match::machine_axis_letter;
+
 /// Quantity that a word names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HeaderQuantity {
@@ -144,13 +146,14 @@ pub(super) fn meaning(word: &str) -> Option<WordMeaning> {
     MEANINGS.get(word).copied()
 }
 
-/// Returns the name of the axis if the word is one: `x`, `x1`, `sp`, `sp1`, `spindle`.
+/// Returns the name of the axis if the word is one: `x`, `x1`, `mx1`, `ax1`, `sp`, `sp1`, `spindle`.
 pub(super) fn axis_name(word: &str) -> Option<String> {
     let name = word.trim_end_matches(|c: char| c.is_ascii_digit());
     let has_few_digits = word.len() - name.len() <= 2;
     let is_letter = name.len() == 1 && AXIS_LETTERS.contains(name);
     let is_spindle = matches!(name, "sp" | "spindle" | "spindel");
-    ((is_letter || is_spindle) && has_few_digits).then(|| word.to_owned())
+    let is_machine_axis = machine_axis_letter(word).is_some();
+    ((is_letter || is_spindle || is_machine_axis) && has_few_digits).then(|| word.to_owned())
 }
 
 /// Returns true if the word announces the number or name of an axis.
@@ -258,10 +261,10 @@ mod tests {
 
     #[test]
     fn axis_names_are_letters_with_up_to_two_digits() {
-        for name in ["x", "x1", "c12", "sp", "sp1", "spindle"] {
+        for name in ["x", "x1", "c12", "mx1", "ax1", "sp", "sp1", "spindle"] {
             assert_eq!(axis_name(name).as_deref(), Some(name));
         }
-        for word in ["t", "x123", "xy", "", "1"] {
+        for word in ["t", "x123", "xy", "", "1", "mx", "ax", "mx123", "max1"] {
             assert_eq!(axis_name(word), None, "{word}");
         }
     }

@@ -179,6 +179,7 @@ pub fn example() -> Document {
             TableColumn::new("± (95 %)", "kg"),
         ],
         rows: vec![vec!["inertia".to_owned(), "95.1".to_owned(), "-0.4".to_owned()]],
+        ..Table::default()
     };
     let section = |heading: &str, chart| Section { charts: vec![chart], ..Section::new(heading) };
     Document {
@@ -208,5 +209,6 @@ pub fn example() -> Document {
             section("Delays", delay()),
             section("Validation", validation(20_000)),
         ],
+        ..Document::default()
     }
 }

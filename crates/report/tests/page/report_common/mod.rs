@@ -2,6 +2,7 @@
 
 pub mod charts;
 
+use serde_json::Value;
 use virtual_axes_core::assess::{AxisTrace, CircleTrace, SignalRecording, ToolTrace};
 use virtual_axes_core::config::AxisKind;
 use virtual_axes_report::ReportRun;
@@ -190,13 +191,7 @@ pub fn five_axes(every: u64) -> SignalRecording {
 pub fn report_run<'a>(title: &'a str, recording: &'a SignalRecording) -> ReportRun<'a> {
     let facts = [("machine", "mikron_ucp710"), ("controller", title)];
     let facts = facts.map(|(name, value)| (name.to_owned(), value.to_owned())).to_vec();
-    ReportRun { title, facts, recording }
-}
-
-/// Returns the SVG plots of a page.
-pub fn pictures(page: &str) -> Vec<&str> {
-    let pictures = page.split("<svg role=\"img\"").skip(1);
-    pictures.map(|rest| rest.split_once("</svg>").expect("it ends").0).collect()
+    ReportRun { title, facts, recording, program: None }
 }
 
 /// Returns all texts between `before` and `after`.
@@ -204,36 +199,71 @@ pub fn between<'a>(text: &'a str, before: &'a str, after: &'a str) -> Vec<&'a st
     text.split(before).skip(1).map(|rest| rest.split_once(after).expect("it ends").0).collect()
 }
 
-/// Returns the points of an SVG path, pixels.
-pub fn points(path: &str) -> Vec<[f64; 2]> {
-    let mut spaced = String::new();
-    for c in path.chars() {
-        if "Mlh-".contains(c) {
-            spaced.push(' ');
-        }
-        spaced.push(c);
-        if "Mlh".contains(c) {
-            spaced.push(' ');
-        }
-    }
-    let (mut points, mut numbers) = (Vec::<[f64; 2]>::new(), Vec::new());
-    let mut absolute = false;
-    for token in spaced.split_whitespace() {
-        match token {
-            "M" | "l" | "h" => absolute = token == "M",
-            number => numbers.push(number.parse::<f64>().expect("a number")),
-        }
-        if let [x, y] = numbers[..] {
-            let [x0, y0] = if absolute { [0.0, 0.0] } else { *points.last().expect("a start") };
-            points.push([x0 + x, y0 + y]);
-            numbers.clear();
-        }
-    }
-    points
+/// Returns the page without its scripts and their data.
+pub fn without_scripts(page: &str) -> String {
+    let (first, rest) = page.split_once("<script").unwrap_or((page, ""));
+    let others = rest.split("<script").filter_map(|script| Some(script.split_once("</script>")?.1));
+    first.to_owned() + &others.collect::<String>()
 }
 
-/// Returns the plot whose title starts with `title`.
-pub fn picture<'a>(page: &'a str, title: &str) -> &'a str {
-    let found = pictures(page).into_iter().find(|p| p.contains(&format!("-t\">{title}")));
-    found.unwrap_or_else(|| panic!("no plot {title}"))
+/// Asserts that elements are nested correctly, and that every bracket belongs to a tag.
+pub fn assert_well_formed(page: &str) {
+    let page = without_scripts(page);
+    let mut open: Vec<&str> = Vec::new();
+    let mut rest = page.strip_prefix("<!DOCTYPE html>").expect("a document type");
+    while let Some((text, after)) = rest.split_once('<') {
+        assert!(!text.contains('>') || open.last() == Some(&"style"), "{text}");
+        let (tag, after) = after.split_once('>').expect("tags end");
+        assert!(!tag.contains('<'), "{tag}");
+        assert_eq!(tag.matches('"').count() % 2, 0, "{tag}");
+        let name = tag.trim_matches('/').split(' ').next().unwrap_or_default();
+        if tag.starts_with('/') {
+            assert_eq!(open.pop(), Some(name), "{tag}");
+        } else if !["meta", "input"].contains(&name) && !tag.ends_with('/') {
+            open.push(name);
+        }
+        rest = after;
+    }
+    assert!(open.is_empty() && rest.trim().is_empty(), "{open:?} {rest}");
+}
+
+/// Asserts that a page loads nothing, and that no text or datum is an invalid number.
+pub fn assert_self_contained(page: &str) {
+    let text = without_scripts(page);
+    for forbidden in ["http:", "https:", "src=", "url(", "@import", "<link", "href"] {
+        assert!(!text.contains(forbidden), "{forbidden}");
+    }
+    let bad = |word: &str| ["nan", "inf", "infinity"].contains(&word.to_lowercase().as_str());
+    let mut words = text.split(|c: char| !c.is_alphanumeric());
+    assert_eq!(words.find(|word| bad(word)), None);
+    // The data are JSON, which has no invalid numbers.
+    let _ = figures(page);
+}
+
+/// Returns titles and data of the figures of a page.
+pub fn figures(page: &str) -> Vec<(&str, Value)> {
+    let parts = between(page, "<figure>", "</figure>");
+    let of_part = |part| {
+        let data = between(part, "<script type=\"application/json\">", "</script>")[0];
+        (between(part, "<span class=\"title\">", "</span>")[0], serde_json::from_str(data).expect("JSON"))
+    };
+    parts.into_iter().map(of_part).collect()
+}
+
+/// Returns the data of the figure whose title starts with `title`.
+pub fn figure(page: &str, title: &str) -> Value {
+    let found = figures(page).into_iter().find(|(found, _)| found.starts_with(title));
+    found.unwrap_or_else(|| panic!("no figure {title}")).1
+}
+
+/// Returns a column of numbers; null is NaN.
+pub fn column(values: &Value) -> Vec<f64> {
+    values.as_array().expect("a list").iter().map(|value| value.as_f64().unwrap_or(f64::NAN)).collect()
+}
+
+/// Returns the points of a series of a chart, in the units of its axes.
+pub fn points(chart: &Value, panel: usize, label: &str) -> Vec<[f64; 2]> {
+    let all = chart["panels"][panel]["series"].as_array().expect("series");
+    let series = all.iter().find(|series| series["label"] == label).unwrap_or_else(|| panic!("no {label}"));
+    column(&series["x"]).into_iter().zip(column(&series["y"])).map(|(x, y)| [x, y]).collect()
 }

@@ -1,0 +1,88 @@
+//! Calls of subprograms and macros by number: M97, M98, M99, G65, G66, G67.
+
+use super::codes::{Action, Codes, ModalMacro, Subprogram};
+use super::error::Outcome;
+use super::line_words::LineWords;
+use super::parameters::LOCALS;
+use super::state::{Jump, State};
+
+/// Letters of the arguments of a macro, with the numbers of their variables.
+const ARGUMENTS: [(char, usize); 21] = [
+    ('A', 1),
+    ('B', 2),
+    ('C', 3),
+    ('I', 4),
+    ('J', 5),
+    ('K', 6),
+    ('D', 7),
+    ('E', 8),
+    ('F', 9),
+    ('H', 11),
+    ('M', 13),
+    ('Q', 17),
+    ('R', 18),
+    ('S', 19),
+    ('T', 20),
+    ('U', 21),
+    ('V', 22),
+    ('W', 23),
+    ('X', 24),
+    ('Y', 25),
+    ('Z', 26),
+];
+
+impl State {
+    /// Requests the call of a macro: G65, or sets one to follow each motion: G66, G67. Returns true if the words of the line
+    /// are its arguments.
+    pub(super) fn request_macro(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<bool> {
+        if codes.g.modal_macro == Some(ModalMacro::Cancel) {
+            self.modal_macro = None;
+        }
+        let is_modal = codes.g.modal_macro == Some(ModalMacro::Call);
+        if codes.g.action != Some(Action::MacroCall) && !is_modal {
+            return Ok(false);
+        }
+        let name = if is_modal { "G66" } else { "G65" };
+        let program = block.take_integer('P')?;
+        let program = program.ok_or_else(|| format!("{name} requires P, the number of the macro"))?;
+        let times = block.take_integer('L')?.unwrap_or(1);
+        let mut arguments = Box::new([f64::NAN; LOCALS]);
+        for (letter, number) in ARGUMENTS {
+            arguments[number - 1] = block.take(letter).unwrap_or(f64::NAN);
+        }
+        let call = Jump::Macro { program, times, arguments };
+        match is_modal {
+            true => self.modal_macro = Some((call, self.calls)),
+            false => self.jump = Some(call),
+        }
+        Ok(true)
+    }
+
+    /// Requests the macro that follows each motion.
+    pub(super) fn request_modal_macro(&mut self) {
+        if let Some((call, depth)) = &self.modal_macro
+            && *depth == self.calls
+        {
+            self.jump = Some(call.clone());
+        }
+    }
+
+    /// Requests the call of a subprogram or the return from it: M97, M98, M99.
+    pub(super) fn jump(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
+        let Some(code) = codes.m.subprogram else { return Ok(()) };
+        self.jump = Some(match code {
+            Subprogram::Call => {
+                let number =
+                    block.take_integer('P')?.ok_or("M98 requires P, the number of the subprogram")?;
+                Jump::Call { program: number, times: block.take_integer('L')?.unwrap_or(1) }
+            }
+            Subprogram::Local => {
+                let number =
+                    block.take_integer('P')?.ok_or("M97 requires P, the number of the line to call")?;
+                Jump::Local { number, times: block.take_integer('L')?.unwrap_or(1) }
+            }
+            Subprogram::Return => Jump::Return { number: block.take_integer('P')? },
+        });
+        Ok(())
+    }
+}

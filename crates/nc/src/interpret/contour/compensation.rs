@@ -1,0 +1,263 @@
+//! Cutter radius compensation: the path of the tool center beside the contour.
+//!
+//! Outside of a corner the tool center follows an arc about it, inside it turns at the intersection of both parallels. As
+//! in LinuxCNC the first motion ends perpendicular to itself at the contour; as on other controls perpendicular to the
+//! motion that follows. The motion after the end of compensation leaves from the last point of the parallel.
+
+use virtual_axes_core::units::{MILLIMETER, Rounded};
+
+use super::corner::{normal, turn_to};
+use super::piece::{ContourPiece, Point, SAME, angle};
+use crate::interpret::error::Outcome;
+use crate::motion::{Feed, MotionKind, PlanarArc, Plane, ProgramMotion, ProgramStep};
+
+/// Sine of the angle between two motions below which they are tangent.
+const TANGENT: f64 = 1e-6;
+
+/// Cutter radius compensation in effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::interpret) struct Compensation {
+    /// True if the tool is left of the path (G41).
+    pub is_left: bool,
+    /// Tool radius, m; a negative one is on the other side.
+    pub radius: f64,
+}
+
+/// Compensation with the motion that the next one completes.
+#[derive(Debug)]
+pub(in crate::interpret) struct Compensator {
+    is_left: bool,
+    radius: f64,
+    plane: Plane,
+    /// True if the first motion ends perpendicular to itself, as in LinuxCNC.
+    ends_perpendicular: bool,
+    last: Option<Last>,
+}
+
+/// Last motion in the plane.
+#[derive(Debug)]
+struct Last {
+    /// Contour as programmed.
+    contour: ContourPiece,
+    /// Path of the tool center; its end is moved by an inside corner.
+    path: ContourPiece,
+    motion: ProgramMotion,
+    /// True for the first motion of the compensation.
+    is_first: bool,
+    /// Events and motions normal to the plane that follow.
+    after: Vec<ProgramStep>,
+}
+
+impl Compensator {
+    pub(in crate::interpret) fn new(
+        compensation: Compensation,
+        plane: Plane,
+        ends_perpendicular: bool,
+    ) -> Self {
+        let Compensation { is_left, radius } = compensation;
+        let is_left = is_left == (radius >= 0.0);
+        Self { is_left, radius: radius.abs(), plane, ends_perpendicular, last: None }
+    }
+
+    /// Returns true if steps wait for the next motion.
+    pub(in crate::interpret) fn is_waiting(&self) -> bool {
+        self.last.is_some()
+    }
+
+    /// Adds an event after the last motion.
+    pub(in crate::interpret) fn push_event(&mut self, step: ProgramStep) {
+        if let Some(last) = &mut self.last {
+            last.after.push(step);
+        }
+    }
+
+    /// Adds a motion; steps that are complete are appended to `out`.
+    ///
+    /// # Errors
+    ///
+    /// A contour that the tool cannot follow, or a curve that is no line or arc in the plane.
+    pub(in crate::interpret) fn push(
+        &mut self,
+        motion: ProgramMotion,
+        out: &mut Vec<ProgramStep>,
+    ) -> Outcome<()> {
+        let contour = ContourPiece::new(&motion, self.plane)
+            .ok_or("cutter compensation allows lines and arcs in the active plane only: program G40 first")?;
+        let Some(last) = &mut self.last else { return self.enter(contour, motion, out) };
+        if contour.is_still() {
+            last.after.push(ProgramStep::Motion(motion));
+            return Ok(());
+        }
+        let mut path = self.parallel(&contour)?;
+        let Some(mut last) = self.last.take() else { return Ok(()) };
+        let corner = contour.start;
+        let (leave, enter) = (last.contour.tangent(true), contour.tangent(false));
+        let turn = turn_to(leave, enter, self.is_left);
+        if last.is_first && !self.ends_perpendicular {
+            // The lead-in ends perpendicular to the contour.
+            last.path.end = path.start;
+            self.finish(last, out);
+        } else if turn.abs() < TANGENT && leave.dot(&enter) > 0.0 {
+            path.start = last.path.end;
+            self.finish(last, out);
+        } else if turn < 0.0 {
+            let (from, to) = (last.path.end, path.start);
+            self.finish(last, out);
+            out.push(ProgramStep::Motion(self.around(&motion, out, [from, to, corner])));
+        } else {
+            self.inside(&mut last, &mut path, corner, motion.line)?;
+            self.finish(last, out);
+        }
+        let (is_first, after) = (false, Vec::new());
+        self.last = Some(Last { contour, path, motion, is_first, after });
+        Ok(())
+    }
+
+    /// Ends the compensation: appends the steps that wait. Returns the tool center, where the next motion begins.
+    pub(in crate::interpret) fn end(&mut self, out: &mut Vec<ProgramStep>) -> Option<Point> {
+        let last = self.last.take()?;
+        let center = last.path.end;
+        self.finish(last, out);
+        Some(center)
+    }
+
+    fn enter(
+        &mut self,
+        contour: ContourPiece,
+        motion: ProgramMotion,
+        out: &mut Vec<ProgramStep>,
+    ) -> Outcome<()> {
+        if contour.is_still() {
+            out.push(ProgramStep::Motion(motion));
+            return Ok(());
+        }
+        let mut path = contour;
+        if contour.arc.is_some() {
+            self.require_longer((contour.end - contour.start).norm(), "arc")?;
+            path = self.entry_arc(&contour)?;
+        } else {
+            if self.ends_perpendicular {
+                self.require_longer((contour.end - contour.start).norm(), "motion")?;
+            }
+            path.end += normal(contour.tangent(true), self.is_left) * self.radius;
+        }
+        self.last = Some(Last { contour, path, motion, is_first: contour.arc.is_none(), after: Vec::new() });
+        Ok(())
+    }
+
+    fn require_longer(&self, length: f64, what: &str) -> Outcome<()> {
+        if length > self.radius {
+            return Ok(());
+        }
+        let [length, radius] = [length, self.radius].map(|length| Rounded(length / MILLIMETER));
+        Err(format!(
+            "the first {what} with cutter compensation is {length} mm long, it must be longer than the tool radius of \
+             {radius} mm"
+        ))
+    }
+
+    /// Returns the arc from the start of an arc to the end of its parallel, tangent to the parallel there.
+    fn entry_arc(&self, contour: &ContourPiece) -> Outcome<ContourPiece> {
+        let Some((center, sweep)) = contour.arc else { return Ok(*contour) };
+        let end = self.parallel(contour)?.end;
+        let (inward, chord) = ((center - end).normalize(), contour.start - end);
+        let along = inward.dot(&chord);
+        if along.abs() < SAME {
+            return Err(
+                "the first arc with cutter compensation cannot be reached: begin with a line".to_owned()
+            );
+        }
+        let center = end + inward * (0.5 * chord.norm_squared() / along);
+        let change = angle(contour.start - center, end - center);
+        let sweep =
+            if change * sweep > 0.0 { change } else { change + std::f64::consts::TAU * sweep.signum() };
+        Ok(ContourPiece { start: contour.start, end, arc: Some((center, sweep)) })
+    }
+
+    fn parallel(&self, contour: &ContourPiece) -> Outcome<ContourPiece> {
+        let distance = if self.is_left { self.radius } else { -self.radius };
+        contour.parallel(distance).ok_or_else(|| {
+            let [arc, tool] = [contour.radius().unwrap_or_default(), self.radius]
+                .map(|length| Rounded(length / MILLIMETER));
+            format!("the tool radius of {tool} mm does not fit into the arc of radius {arc} mm")
+        })
+    }
+
+    /// Returns the motion around an outside corner.
+    fn around(
+        &self,
+        next: &ProgramMotion,
+        out: &[ProgramStep],
+        [from, to, corner]: [Point; 3],
+    ) -> ProgramMotion {
+        let mut motion = next.clone();
+        // Other axes remain where the motion before has ended.
+        if let Some(ProgramStep::Motion(before)) =
+            out.iter().rev().find(|step| matches!(step, ProgramStep::Motion(_)))
+        {
+            motion.start = before.end;
+        }
+        motion.end = motion.start;
+        let change = angle(from - corner, to - corner);
+        // Around the corner the tool turns against its side.
+        let sign = if self.is_left { -1.0 } else { 1.0 };
+        let sweep = if change * sign > 0.0 { change } else { change + sign * std::f64::consts::TAU };
+        let arc = (next.kind != MotionKind::Rapid).then_some((corner, sweep));
+        if let Some((center, sweep)) = arc {
+            motion.kind = MotionKind::Arc(PlanarArc { plane: self.plane, center: center.into(), sweep });
+            if let Feed::Duration(time) = next.feed {
+                let length = (next.end[0] - next.start[0])
+                    .hypot(next.end[1] - next.start[1])
+                    .hypot(next.end[2] - next.start[2]);
+                motion.feed = Feed::Linear((length / time).max(SAME));
+            }
+        }
+        ContourPiece { start: from, end: to, arc }.write(&mut motion, self.plane);
+        motion
+    }
+
+    /// Ends and begins two parallels at their intersection inside of a corner.
+    fn inside(&self, last: &mut Last, path: &mut ContourPiece, corner: Point, line: usize) -> Outcome<()> {
+        let last_line = last.motion.line;
+        let gouges = || {
+            format!(
+                "the tool radius of {} mm does not fit into the corner between lines {last_line} and {line}",
+                Rounded(self.radius / MILLIMETER)
+            )
+        };
+        // The lead-in turns at its parallel, then begins at its programmed start.
+        let mut lead = last.path;
+        if last.is_first {
+            lead = self.parallel(&last.contour)?;
+        }
+        let point = lead.intersection(path, corner).ok_or_else(gouges)?;
+        if !(lead.move_to(point, true) & path.move_to(point, false)) {
+            return Err(gouges());
+        }
+        last.path = match last.is_first {
+            true => ContourPiece { end: point, ..last.path },
+            false => lead,
+        };
+        Ok(())
+    }
+
+    /// Appends a motion with the path of the tool center, and the steps after it.
+    fn finish(&self, last: Last, out: &mut Vec<ProgramStep>) {
+        let Last { path, mut motion, after, .. } = last;
+        path.write(&mut motion, self.plane);
+        if let MotionKind::Arc(_) = motion.kind
+            && path.arc.is_none()
+        {
+            motion.kind = MotionKind::Line;
+        }
+        out.push(ProgramStep::Motion(motion));
+        let still = ContourPiece { start: path.end, end: path.end, arc: None };
+        out.extend(after.into_iter().map(|step| match step {
+            ProgramStep::Motion(mut motion) => {
+                still.write(&mut motion, self.plane);
+                ProgramStep::Motion(motion)
+            }
+            event => event,
+        }));
+    }
+}

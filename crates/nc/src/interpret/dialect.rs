@@ -1,0 +1,403 @@
+//! Dialects of G code, and their detection from the content of a program.
+
+use std::fmt;
+use std::io::{BufRead, Read, Seek, SeekFrom};
+use std::str::FromStr;
+
+/// Bytes at the start of a program in which its dialect is detected.
+const DETECTION_BYTES: usize = 1 << 20;
+/// Longest line in which evidence is searched, bytes.
+const LINE_BYTES: u64 = 4096;
+/// Points from which a dialect is detected.
+const ENOUGH: u32 = 3;
+
+/// Dialect of part programs: the control for which a program was written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Dialect {
+    /// LinuxCNC: RS-274/NGC with O-words and named parameters.
+    #[default]
+    LinuxCnc,
+    /// Fanuc: ISO code with custom macro B.
+    Fanuc,
+    /// Haas: as Fanuc, with codes of its own.
+    Haas,
+    /// Sinumerik: native programs of Siemens.
+    Sinumerik,
+    /// grbl: hobby routers and lasers.
+    Grbl,
+    /// Mach3 and Mach4.
+    Mach3,
+}
+
+impl Dialect {
+    /// All dialects.
+    pub const ALL: [Self; 6] =
+        [Self::LinuxCnc, Self::Fanuc, Self::Haas, Self::Sinumerik, Self::Grbl, Self::Mach3];
+
+    /// Returns the name, as in `--dialect`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LinuxCnc => "linuxcnc",
+            Self::Fanuc => "fanuc",
+            Self::Haas => "haas",
+            Self::Sinumerik => "sinumerik",
+            Self::Grbl => "grbl",
+            Self::Mach3 => "mach3",
+        }
+    }
+
+    /// Returns the bit of the dialect in sets.
+    pub(super) fn bit(self) -> u8 {
+        1 << self as u8
+    }
+
+    /// Returns true for Fanuc and Haas: macro B, dwells in ms, subprograms after M30.
+    pub(super) fn has_macro_b(self) -> bool {
+        matches!(self, Self::Fanuc | Self::Haas)
+    }
+}
+
+impl fmt::Display for Dialect {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.name())
+    }
+}
+
+impl FromStr for Dialect {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|dialect| dialect.name().eq_ignore_ascii_case(text));
+        found.ok_or_else(|| {
+            let known = Self::ALL.map(Self::name).join(", ");
+            format!("{text}: not a dialect; must be one of {known}")
+        })
+    }
+}
+
+/// Dialect that was detected, and the text that decided.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DetectedDialect {
+    /// Dialect; LinuxCNC without evidence.
+    pub dialect: Dialect,
+    /// Text that decided, with its source line from 1; `None` without evidence.
+    pub evidence: Option<(String, usize)>,
+}
+
+impl DetectedDialect {
+    /// Returns the note on a dialect that was detected and is not the default one: line and text.
+    pub fn note(&self) -> Option<(usize, String)> {
+        let (text, line) = self.evidence.as_ref().filter(|_| self.dialect != Dialect::LinuxCnc)?;
+        Some((*line, format!("dialect {}, detected from {text}; --dialect sets another", self.dialect)))
+    }
+
+    /// Detects the dialect from the first MiB of a program, and returns to its start. A source that cannot be read has no
+    /// evidence.
+    pub fn of<R: BufRead + Seek>(source: &mut R) -> Self {
+        let mut scores: [Score; Dialect::ALL.len()] = Default::default();
+        let (mut bytes, mut line) = (0, Vec::new());
+        for number in 1.. {
+            line.clear();
+            let read = source.by_ref().take(LINE_BYTES).read_until(b'\n', &mut line).unwrap_or(0);
+            bytes += read;
+            if read == 0 || bytes > DETECTION_BYTES {
+                break;
+            }
+            add_evidence(&String::from_utf8_lossy(&line).trim().to_ascii_uppercase(), number, &mut scores);
+        }
+        if source.seek(SeekFrom::Start(0)).is_err() {
+            scores = Default::default();
+        }
+        let best = Dialect::ALL.into_iter().zip(scores).rev().max_by_key(|(_, score)| score.points);
+        match best {
+            Some((dialect, Score { points, text, .. })) if points >= ENOUGH => {
+                Self { dialect, evidence: text }
+            }
+            _ => Self { dialect: Dialect::LinuxCnc, evidence: None },
+        }
+    }
+}
+
+/// Returns true for a text of which at least half of the lines are words of G code, and one is at all.
+pub fn is_g_code(head: &[u8]) -> bool {
+    let (mut words, mut others) = (0, 0);
+    for line in head.split(|byte| *byte == b'\n') {
+        let line = String::from_utf8_lossy(line).trim().to_ascii_uppercase();
+        let code = code_of(&line);
+        if code.is_empty() || code.starts_with('%') {
+            continue;
+        }
+        let mut letters = code.trim_start_matches('/').chars();
+        let is_word = letters.next().is_some_and(|letter| "GMNXYZTFSO#:".contains(letter))
+            && letters.next().is_some_and(|next| next.is_ascii_digit() || "+-.<[=".contains(next));
+        *(if is_word { &mut words } else { &mut others }) += 1;
+    }
+    words > 0 && words >= others
+}
+
+/// Evidence for one dialect.
+#[derive(Debug, Clone, Default)]
+struct Score {
+    points: u32,
+    /// Rules that have counted, as bits.
+    rules: u128,
+    /// Points of the text.
+    strongest: u32,
+    text: Option<(String, usize)>,
+}
+
+pub(super) const LINUXCNC: u8 = 1 << Dialect::LinuxCnc as u8;
+pub(super) const FANUC: u8 = 1 << Dialect::Fanuc as u8;
+pub(super) const HAAS: u8 = 1 << Dialect::Haas as u8;
+const SINUMERIK: u8 = 1 << Dialect::Sinumerik as u8;
+pub(super) const GRBL: u8 = 1 << Dialect::Grbl as u8;
+pub(super) const MACH3: u8 = 1 << Dialect::Mach3 as u8;
+
+/// Bits of all dialects.
+pub(super) const ALL: u8 = u8::MAX;
+
+/// Part of a line that a rule requires.
+#[derive(Debug, Clone, Copy)]
+enum Pattern {
+    /// Word with its number: `G187`, not `G18` or `G187.1`.
+    Word(&'static str),
+    /// Text in the line without blanks and comments.
+    Code(&'static str),
+    /// Text at the start of the line without blanks and comments.
+    Start(&'static str),
+    /// Text in a comment of one of the first lines.
+    Comment(&'static str),
+    /// Number of a program or subprogram alone.
+    ProgramNumber,
+    /// O-word with a keyword or a name.
+    OWord,
+    /// Assignment to a name or address: `X=`, `R1=`.
+    Assignment,
+}
+
+use Pattern::{Assignment, Code, Comment, OWord, ProgramNumber, Start, Word};
+
+/// Evidence: dialects as bits, points, and the text.
+const RULES: &[(u8, u32, Pattern)] = &[
+    (LINUXCNC, 8, OWord),
+    (LINUXCNC, 6, Code("#<")),
+    (LINUXCNC, 4, Word("G33.1")),
+    (LINUXCNC, 3, Word("G61.1")),
+    (LINUXCNC, 3, Word("G43.1")),
+    (LINUXCNC, 3, Word("G5.2")),
+    (LINUXCNC, 3, Code("G64P")),
+    (LINUXCNC, 6, Comment("LINUXCNC")),
+    (LINUXCNC, 6, Comment("EMC2")),
+    (LINUXCNC | MACH3, 2, Word("G91.1")),
+    (LINUXCNC | MACH3, 2, Word("G59.1")),
+    (FANUC | HAAS, 3, ProgramNumber),
+    (FANUC | HAAS, 4, Code("IF[")),
+    (FANUC | HAAS, 4, Code("WHILE[")),
+    (FANUC | HAAS, 4, Code("GOTO")),
+    (FANUC | HAAS, 4, Code("G4X")),
+    (FANUC | HAAS, 4, Code("G04X")),
+    (FANUC | HAAS, 4, Code("G4U")),
+    (FANUC | HAAS, 4, Code("G04U")),
+    (FANUC | HAAS, 3, Word("G65")),
+    (FANUC | HAAS, 3, Word("G66")),
+    (FANUC | HAAS, 3, Word("G54.1")),
+    (FANUC | HAAS, 3, Code("#3006=")),
+    (FANUC | HAAS, 3, Code("#3000=")),
+    (FANUC | HAAS, 3, Code("DPRNT[")),
+    (FANUC | HAAS, 3, Word("G68.2")),
+    (FANUC, 3, Code("G05.1Q")),
+    (FANUC, 3, Code("G5.1Q")),
+    (FANUC, 3, Word("G05P10000")),
+    (FANUC, 1, Word("G43.4")),
+    (FANUC, 1, Word("G43.5")),
+    (FANUC, 3, Word("G53.1")),
+    (FANUC, 6, Comment("FANUC")),
+    (HAAS, 6, Comment("HAAS")),
+    (HAAS, 4, Word("G187")),
+    (HAAS, 4, Word("G154")),
+    (HAAS, 4, Word("G150")),
+    (HAAS, 4, Word("G234")),
+    (HAAS, 4, Word("G254")),
+    (HAAS, 3, Word("G103")),
+    (HAAS, 4, Word("M97")),
+    (HAAS, 4, Word("G129")),
+    (SINUMERIK, 8, Start("%_N_")),
+    (SINUMERIK, 6, Assignment),
+    (SINUMERIK, 6, Code("CYCLE8")),
+    (SINUMERIK, 6, Code("MCALL")),
+    (SINUMERIK, 6, Code("TRAORI")),
+    (SINUMERIK, 6, Code("TRAFOOF")),
+    (SINUMERIK, 6, Code("SUPA")),
+    (SINUMERIK, 6, Code("STOPRE")),
+    (SINUMERIK, 6, Code("WORKPIECE(")),
+    (SINUMERIK, 6, Code("DEFREAL")),
+    (SINUMERIK, 6, Code("DEFINT")),
+    (SINUMERIK, 6, Code("$P_")),
+    (SINUMERIK, 6, Code("$TC_")),
+    (SINUMERIK, 6, Code("$AC_")),
+    (SINUMERIK, 6, Code("GOTOF")),
+    (SINUMERIK, 6, Code("GOTOB")),
+    (SINUMERIK, 6, Code("MSG(")),
+    (SINUMERIK, 4, Start("TRANS")),
+    (SINUMERIK, 4, Code("ATRANS")),
+    (SINUMERIK, 4, Code("AROT")),
+    (SINUMERIK, 4, Word("G641")),
+    (SINUMERIK, 4, Word("G642")),
+    (SINUMERIK, 4, Word("G645")),
+    (SINUMERIK, 3, Word("G500")),
+    (SINUMERIK, 6, Word("G710")),
+    (SINUMERIK, 6, Word("G700")),
+    (SINUMERIK, 3, Word("G153")),
+    (SINUMERIK, 3, Word("G601")),
+    (SINUMERIK, 3, Word("M17")),
+    (SINUMERIK, 4, Code("G4F")),
+    (SINUMERIK, 6, Code("FFWON")),
+    (SINUMERIK, 6, Code("COMPCAD")),
+    (SINUMERIK, 6, Code("ORIWKS")),
+    (SINUMERIK, 6, Code("POCKET")),
+    (SINUMERIK, 6, Code("HOLES")),
+    (SINUMERIK, 6, Comment("SINUMERIK")),
+    (SINUMERIK, 6, Comment("SIEMENS")),
+    (GRBL, 6, Start("$H")),
+    (GRBL, 6, Start("$J=")),
+    (GRBL, 6, Start("$X")),
+    (GRBL, 6, Comment("GRBL")),
+    (MACH3, 6, Comment("MACH3")),
+    (MACH3, 6, Comment("MACH2")),
+    (MACH3, 6, Comment("MACH4")),
+];
+
+/// Lines at the start of a program whose comments are evidence.
+const COMMENT_LINES: usize = 60;
+
+fn add_evidence(line: &str, number: usize, scores: &mut [Score; Dialect::ALL.len()]) {
+    let code = code_of(line);
+    for (index, (dialects, points, pattern)) in RULES.iter().enumerate() {
+        let Some(text) = pattern.text_in(line, &code, number) else { continue };
+        for (dialect, score) in Dialect::ALL.into_iter().zip(scores.iter_mut()) {
+            if dialects & (1 << dialect as u8) == 0 || score.rules & (1 << index) != 0 {
+                continue;
+            }
+            score.rules |= 1 << index;
+            score.points += points;
+            if *points > score.strongest {
+                (score.strongest, score.text) = (*points, Some((text.to_owned(), number)));
+            }
+        }
+    }
+}
+
+impl Pattern {
+    /// Returns the text that satisfies the pattern.
+    fn text_in(self, line: &str, code: &str, number: usize) -> Option<&'static str> {
+        let found = |is_found: bool, text| is_found.then_some(text);
+        match self {
+            Word(word) => found(has_word(code, word), word),
+            Code(text) => found(code.contains(text), text),
+            Start(text) => found(code.starts_with(text), text),
+            Comment(text) => {
+                let is_comment = |at: usize| line[..at].contains(['(', ';']);
+                found(number <= COMMENT_LINES && line.find(text).is_some_and(is_comment), text)
+            }
+            ProgramNumber => found(is_program_number(code), "the program number O"),
+            OWord => found(is_o_word(code), "an O-word"),
+            Assignment => found(has_assignment(code), "an assignment with ="),
+        }
+    }
+}
+
+/// Returns a line in upper case without blanks and comments.
+fn code_of(line: &str) -> String {
+    let mut code = String::with_capacity(line.len());
+    let mut depth = 0_u32;
+    for letter in line.chars() {
+        match letter {
+            ';' if depth == 0 => break,
+            '(' => {
+                // The parenthesis of a call remains.
+                if depth == 0 && code.ends_with(|letter: char| letter.is_ascii_alphanumeric()) {
+                    code.push('(');
+                }
+                depth += 1;
+            }
+            ')' => depth = depth.saturating_sub(1),
+            _ if depth > 0 || letter.is_whitespace() => {}
+            _ => code.push(letter),
+        }
+    }
+    code
+}
+
+fn has_word(code: &str, word: &str) -> bool {
+    code.match_indices(word).any(|(at, _)| {
+        !code[at + word.len()..].starts_with(|next: char| next.is_ascii_digit() || next == '.')
+            && !code[..at].ends_with(|before: char| before.is_ascii_alphabetic())
+    })
+}
+
+fn is_program_number(code: &str) -> bool {
+    let rest = code.strip_prefix(['O', ':']).unwrap_or_default();
+    let after = rest.trim_start_matches(|letter: char| letter.is_ascii_digit());
+    after.len() < rest.len() && (after.is_empty() || after.starts_with(['(', 'G', 'N', 'M', 'T']))
+}
+
+fn is_o_word(code: &str) -> bool {
+    let Some(rest) = code.strip_prefix('O') else { return false };
+    let keyword = rest.trim_start_matches(|letter: char| letter.is_ascii_digit());
+    let is_keyword = ["SUB", "ENDSUB", "CALL", "IF", "WHILE", "DO", "REPEAT", "RETURN"]
+        .into_iter()
+        .any(|word| keyword.starts_with(word));
+    rest.starts_with('<') || (keyword.len() < rest.len() && is_keyword)
+}
+
+fn has_assignment(code: &str) -> bool {
+    code.match_indices('=').any(|(at, _)| {
+        let before = &code[..at];
+        let is_part = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
+        let name = &before[before.trim_end_matches(is_part).len()..];
+        let sign = before[..before.len() - name.len()].chars().next_back();
+        name.starts_with(|letter: char| letter.is_ascii_alphabetic())
+            && !matches!(sign, Some('#' | '$' | '<' | '['))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn detected(text: &str) -> (&'static str, Option<usize>) {
+        let found = DetectedDialect::of(&mut std::io::Cursor::new(text));
+        (found.dialect.name(), found.evidence.map(|(_, line)| line))
+    }
+
+    #[test]
+    fn dialects_are_detected_by_their_words() {
+        for (text, expected) in [
+            ("G21 G90\nG1 X1 F100\nM2\n", ("linuxcnc", None)),
+            ("G21\no<pocket> call [3]\n", ("linuxcnc", Some(2))),
+            ("#<depth>=3\n", ("linuxcnc", Some(1))),
+            ("%\nO1000 (PART)\nG28 G91 Z0\nM30\n%\n", ("fanuc", Some(2))),
+            ("%\nO1000\nG187 P1\nM30\n%\n", ("haas", Some(3))),
+            ("G90\n#101=#101+1\nIF [#101 LT 5] GOTO 10\n", ("fanuc", Some(3))),
+            ("; part\nN10 G0 X=R1 Y=20\n", ("sinumerik", Some(2))),
+            ("N10 G54 D1\nN20 TRAORI\n", ("sinumerik", Some(2))),
+            ("G43.4 H1\nG0 A40\nG4 P0.4\n", ("linuxcnc", None)),
+            ("$H\nG21\nG0 X1\n", ("grbl", Some(1))),
+            ("(post: grbl)\nG0 X1\n", ("grbl", Some(1))),
+            ("(Mach3 mill)\nG0 X1\n", ("mach3", Some(1))),
+            ("#100=ACOS[0.5]\n#101=[#100*2]\nG0 X#101\n", ("linuxcnc", None)),
+        ] {
+            assert_eq!(detected(text), expected, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn names_of_dialects_are_read_without_regard_to_case() {
+        assert_eq!("Haas".parse(), Ok(Dialect::Haas));
+        let error = "okuma".parse::<Dialect>().unwrap_err();
+        assert_eq!(
+            error,
+            "okuma: not a dialect; must be one of linuxcnc, fanuc, haas, sinumerik, grbl, mach3"
+        );
+    }
+}

@@ -1,0 +1,68 @@
+//! Subprograms in files beside the program: `drill.ngc` for `O<drill> call`, `O1234`, `1234.nc` for M98 P1234.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::error::Outcome;
+
+/// Largest number of files of a folder that are considered.
+const MAX_ENTRIES: usize = 10_000;
+/// Largest file of a subprogram, bytes.
+const MAX_FILE: u64 = 1 << 24;
+
+/// Reads the file of a subprogram, if the folder has one.
+///
+/// # Errors
+///
+/// A file that cannot be read or is too large.
+pub(super) fn subprogram_file(folder: Option<&Path>, label: &str) -> Outcome<Option<Vec<u8>>> {
+    let Some(path) = folder.and_then(|folder| find(folder, label)) else { return Ok(None) };
+    let failure = |error: std::io::Error| format!("O{label}: {}: {error}", path.display());
+    let size = fs::metadata(&path).map_err(failure)?.len();
+    if size > MAX_FILE {
+        return Err(format!("O{label}: its file has {size} bytes, at most {MAX_FILE} are allowed"));
+    }
+    fs::read(&path).map(Some).map_err(failure)
+}
+
+fn find(folder: &Path, label: &str) -> Option<PathBuf> {
+    let entries = fs::read_dir(folder).ok()?.take(MAX_ENTRIES);
+    let mut found: Vec<_> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.file_stem().and_then(|stem| stem.to_str()).is_some_and(|stem| is_of(stem, label)))
+        .filter(|path| path.is_file())
+        .collect();
+    found.sort();
+    found.into_iter().next()
+}
+
+/// Returns true for a file name without extension that belongs to a label: the name, or `O` and the number with zeros.
+fn is_of(stem: &str, label: &str) -> bool {
+    let number = |text: &str| -> Option<u32> {
+        text.bytes().all(|byte| byte.is_ascii_digit()).then(|| text.parse().ok())?
+    };
+    match number(label) {
+        Some(label) => number(stem.trim_start_matches(['O', 'o'])) == Some(label),
+        None => stem.eq_ignore_ascii_case(label),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_numbers_find_their_files() {
+        for (stem, label, is_found) in [
+            ("drill", "drill", true),
+            ("Drill", "drill", true),
+            ("drill2", "drill", false),
+            ("O1234", "1234", true),
+            ("o0012", "12", true),
+            ("12", "12", true),
+            ("x12", "12", false),
+        ] {
+            assert_eq!(is_of(stem, label), is_found, "{stem} {label}");
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! Programmable frames: scaling and mirroring (G51, G51.1), rotation (G68), tilted planes (G68.2, G53.1), polar
+//! coordinates (G16).
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::codes::{Codes, Polar, Rotation, Scaling};
+use super::dialect::Dialect;
+use super::error::Outcome;
+use super::frame::CoordinateFrame;
+use super::line_words::LineWords;
+use super::state::State;
+use crate::motion::{AXIS_LETTERS, Coordinates};
+
+/// Index of scaling, mirroring and rotation in the parts of the frame.
+const SCALING: usize = 0;
+const MIRROR: usize = 1;
+const ROTATION: usize = 2;
+/// Factor of a P without decimal point in G51 of Fanuc.
+const THOUSANDTH: f64 = 1e-3;
+/// Smallest integer that is a factor in thousandths.
+const LEAST_THOUSANDTHS: f64 = 50.0;
+/// Smallest factor of a scaling.
+const LEAST_FACTOR: f64 = 1e-6;
+
+impl State {
+    /// Sets polar coordinates and frames: G15, G16, G50, G51, G50.1, G51.1, G68, G68.2, G68.3, G69.
+    pub(super) fn set_frames(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
+        match codes.g.polar {
+            Some(Polar::On) => self.modal.polar = Some([0.0; 2]),
+            Some(Polar::Off) => self.modal.polar = None,
+            None => {}
+        }
+        if codes.g.scaling.is_none() && codes.g.rotation.is_none() {
+            return Ok(());
+        }
+        self.finish_contour()?;
+        match codes.g.scaling {
+            None => {}
+            Some(Scaling::Off) => self.modal.frames[SCALING] = CoordinateFrame::identity(),
+            Some(Scaling::On) => self.modal.frames[SCALING] = self.scaling(block)?,
+            Some(Scaling::MirrorOff | Scaling::MirrorOff100) => {
+                block.skip("XYZABC");
+                self.modal.frames[MIRROR] = CoordinateFrame::identity();
+            }
+            Some(Scaling::Mirror | Scaling::Mirror101) => {
+                let center = self.center(block)?;
+                let factors = center.map(|center| if center.is_some() { -1.0 } else { 1.0 });
+                let center = Vector3::from(center.map(Option::unwrap_or_default));
+                let mirror = CoordinateFrame::scaling(Vector3::from(factors)).about(center);
+                self.modal.frames[MIRROR] = self.modal.frames[MIRROR].then(&mirror);
+            }
+        }
+        match codes.g.rotation {
+            None => {}
+            Some(Rotation::Off) => {
+                self.modal.frames[ROTATION] = CoordinateFrame::identity();
+                self.tilt = None;
+            }
+            Some(Rotation::On) => self.modal.frames[ROTATION] = self.rotation(block)?,
+            Some(Rotation::Tilted) => self.tilt = Some(self.tilted(block)?),
+            Some(Rotation::ByTool) => self.tilt = Some(self.tilted_by_tool(block)?),
+        }
+        let [scaling, mirror, rotation] = &self.modal.frames;
+        self.frame = rotation.then(scaling).then(mirror);
+        Ok(())
+    }
+
+    /// Returns the words X, Y and Z, which then count as used, m.
+    fn center(&self, block: &mut LineWords) -> Outcome<[Option<f64>; 3]> {
+        let words = ['X', 'Y', 'Z'].map(|letter| block.take(letter).map(|value| value * self.modal.length));
+        Ok(words)
+    }
+
+    fn scaling(&self, block: &mut LineWords) -> Outcome<CoordinateFrame> {
+        let letters = if self.dialect == Dialect::Mach3 { ['X', 'Y', 'Z'] } else { ['I', 'J', 'K'] };
+        let mut factor = |letter: char| {
+            let has_point = block.has_point(letter);
+            let value = block.take(letter)?;
+            let is_integer = !has_point && self.dialect == Dialect::Fanuc && value.abs() >= LEAST_THOUSANDTHS;
+            Some(if is_integer { value * THOUSANDTH } else { value })
+        };
+        let each = letters.map(&mut factor);
+        let factors = match factor('P') {
+            Some(all) => [all; 3],
+            None => each.map(|factor| factor.unwrap_or(1.0)),
+        };
+        if factors.iter().any(|factor| factor.abs() < LEAST_FACTOR) {
+            return Err("G51: a factor of 0 is not allowed".to_owned());
+        }
+        let center = self.center(block)?;
+        let here = self.programmed();
+        // Without a center, Mach3 scales about the origin, others about the position.
+        let default = |axis: usize| if self.dialect == Dialect::Mach3 { 0.0 } else { here[axis] };
+        let center = Vector3::from([0, 1, 2].map(|axis| center[axis].unwrap_or_else(|| default(axis))));
+        Ok(CoordinateFrame::scaling(Vector3::from(factors)).about(center))
+    }
+
+    fn rotation(&mut self, block: &mut LineWords) -> Outcome<CoordinateFrame> {
+        if block.has_any(&['I', 'J', 'K']) {
+            return Err("G68 with I, J and K is not supported: program G68.2 with Euler angles".to_owned());
+        }
+        let [first, second, normal] = self.modal.plane.axes();
+        let angle = block.take('R').unwrap_or(0.0).to_radians();
+        // The center counts before the rotation.
+        self.modal.frames[ROTATION] = CoordinateFrame::identity();
+        self.frame = self.modal.frames[SCALING].then(&self.modal.frames[MIRROR]);
+        let here = self.programmed();
+        let mut center = Vector3::from_column_slice(&here[..3]);
+        // Mach3 has the center in A and B.
+        for (letter, axis) in [('A', first), ('B', second)] {
+            if self.dialect == Dialect::Mach3
+                && let Some(value) = block.take(letter)
+            {
+                center[axis] = value * self.modal.length;
+            }
+        }
+        for axis in [first, second] {
+            if let Some(value) = block.take(AXIS_LETTERS[axis]) {
+                center[axis] = value * self.modal.length;
+            }
+        }
+        block.take(AXIS_LETTERS[normal]);
+        Ok(CoordinateFrame::rotation(normal, angle).about(center))
+    }
+
+    /// Returns the plane of G68.2: origin X Y Z, and Euler angles I about Z, J about X, K about Z.
+    fn tilted(&mut self, block: &mut LineWords) -> Outcome<CoordinateFrame> {
+        if block.take_integer('P')?.is_some_and(|method| method != 0) {
+            return Err("G68.2 is supported with Euler angles I J K only, without P".to_owned());
+        }
+        block.skip("Q");
+        let origin = Vector3::from(self.center(block)?.map(Option::unwrap_or_default));
+        let [i, j, k] = ['I', 'J', 'K'].map(|letter| block.take(letter).unwrap_or(0.0).to_radians());
+        self.tilt = None;
+        let turned = CoordinateFrame::rotation(2, i)
+            .then(&CoordinateFrame::rotation(0, j))
+            .then(&CoordinateFrame::rotation(2, k));
+        Ok(CoordinateFrame::shift(origin).then(&turned))
+    }
+
+    /// Returns the plane normal to the tool axis: G68.3.
+    fn tilted_by_tool(&mut self, block: &mut LineWords) -> Outcome<CoordinateFrame> {
+        let origin = Vector3::from(self.center(block)?.map(Option::unwrap_or_default));
+        let turn = block.take('R').unwrap_or(0.0).to_radians();
+        let transform = self.options.kinematics.as_ref();
+        let transform = transform.ok_or("G68.3 requires a machine with kinematics")?;
+        let normal = Vector3::from(transform.direction(&self.position));
+        self.tilt = None;
+        // X of the plane is horizontal.
+        let x = Vector3::new(0.0, 0.0, 1.0).cross(&normal);
+        let x = if x.norm() < 1e-9 { Vector3::x() } else { x.normalize() };
+        let plane = CoordinateFrame { linear: Matrix3::from_columns(&[x, normal.cross(&x), normal]), origin };
+        Ok(plane.then(&CoordinateFrame::rotation(2, turn)))
+    }
+
+    /// Turns the tool axis normal to the tilted plane: G53.1. X, Y and Z stand still.
+    pub(super) fn tilt_tool(&mut self, block: &mut LineWords) -> Outcome<()> {
+        block.skip("PR");
+        let tilt = self.tilt.ok_or("G53.1 requires a tilted plane: program G68.2 first")?;
+        self.finish_contour()?;
+        let transform = self.options.kinematics.as_ref();
+        let transform = transform.ok_or("G53.1 requires a machine with kinematics")?;
+        let normal = tilt.linear.column(2).into_owned();
+        let end: Coordinates =
+            transform.oriented(normal.into(), &self.position).map_err(|reason| format!("G53.1: {reason}"))?;
+        self.push_rapid(end)
+    }
+
+    /// Replaces the words of the plane by their meaning in polar coordinates (G16): radius and angle.
+    pub(super) fn replace_polar(
+        &mut self,
+        words: &[bool; 2],
+        [first, second]: [usize; 2],
+        end: &mut Coordinates,
+        raw: [f64; 2],
+    ) {
+        let Some([radius, angle]) = &mut self.modal.polar else { return };
+        if !words[0] && !words[1] {
+            return;
+        }
+        if words[0] {
+            *radius = raw[0];
+        }
+        if words[1] {
+            *angle = if self.modal.is_incremental { *angle + raw[1] } else { raw[1] };
+        }
+        let (sin, cos) = angle.to_radians().sin_cos();
+        (end[first], end[second]) = (*radius * cos, *radius * sin);
+    }
+}

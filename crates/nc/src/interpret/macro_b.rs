@@ -1,0 +1,141 @@
+//! Statements of macro B: IF, WHILE, GOTO.
+
+use std::io::{BufRead, Seek};
+
+use super::Interpreter;
+use super::error::Outcome;
+use super::expression::Scanner;
+use super::limits::MAX_SUBPROGRAMS;
+use super::o_words::is_o_word;
+use super::parameters::integer;
+use super::source::Place;
+use super::state::Jump;
+
+/// Statements without effect in a simulation.
+const WITHOUT_EFFECT: [&str; 5] = ["popen", "pclos", "dprnt", "bprnt", "setvn"];
+
+impl<R: BufRead + Seek> Interpreter<R> {
+    /// Executes the statement of macro B in the line at `place`; returns false if the line has words.
+    pub(super) fn execute_statement(&mut self, place: Place) -> Outcome<bool> {
+        let text = &self.line.text;
+        if text.starts_with(b"if") {
+            self.execute_if()?;
+        } else if text.starts_with(b"while") {
+            let mut scanner = Scanner::new(text, &self.state);
+            scanner.skip("while");
+            let is_true = is_true(scanner.bracket()?);
+            let number = loop_number(&mut scanner, "do")?;
+            self.begin_loop(place, number, is_true)?;
+        } else if text.starts_with(b"do") {
+            let number = loop_number(&mut Scanner::new(text, &self.state), "do")?;
+            self.begin_loop(place, number, true)?;
+        } else if text.starts_with(b"end") {
+            let number = loop_number(&mut Scanner::new(text, &self.state), "end")?;
+            let key = (self.flow.calls.len(), number);
+            let start = self.flow.loops.get(&key).copied();
+            self.source.jump(start.ok_or_else(|| format!("END{number} without DO{number}"))?)?;
+        } else if text.starts_with(b"goto") {
+            let mut scanner = Scanner::new(text, &self.state);
+            let number = jump_target(&mut scanner)?;
+            self.go_to(number)?;
+        } else if is_o_word(text) {
+            return self.execute_program_number();
+        } else if text.first() == Some(&b'<') {
+            // Name of the program.
+        } else if let Some(name) = WITHOUT_EFFECT.into_iter().find(|name| text.starts_with(name.as_bytes())) {
+            self.state.note_without_effect(name.to_uppercase());
+        } else {
+            return Ok(false);
+        }
+        Ok(true)
+    }
+
+    /// Executes `IF [condition] GOTO n` or `IF [condition] THEN words`.
+    fn execute_if(&mut self) -> Outcome<()> {
+        let mut scanner = Scanner::new(&self.line.text, &self.state);
+        scanner.skip("if");
+        let is_true = is_true(scanner.bracket()?);
+        if scanner.starts_with("goto") {
+            let number = jump_target(&mut scanner)?;
+            return if is_true { self.go_to(number) } else { Ok(()) };
+        }
+        if !scanner.skip("then") {
+            return Err(format!("{}: IF requires GOTO or THEN", scanner.found()));
+        }
+        if scanner.peek().is_none() {
+            return Err("IF THEN requires its words in the same line".to_owned());
+        }
+        let rest = scanner.position();
+        if !is_true {
+            return Ok(());
+        }
+        if scanner.starts_with("goto") {
+            let number = jump_target(&mut scanner)?;
+            return self.go_to(number);
+        }
+        self.execute_words(rest)
+    }
+
+    /// Executes the words after the number of a program: `O1000 G21`.
+    fn execute_program_number(&mut self) -> Outcome<bool> {
+        let text = &self.line.text;
+        let end = text.iter().skip(1).position(|byte| !byte.is_ascii_digit());
+        match end.map(|end| end + 1) {
+            None if text.len() > 1 => Ok(true),
+            Some(1) if text.get(1) == Some(&b'<') => Ok(true),
+            None | Some(1) => {
+                let text = String::from_utf8_lossy(text).to_uppercase();
+                Err(format!("{text}: O requires the number of the program"))
+            }
+            Some(end) => self.execute_words(end).map(|()| true),
+        }
+    }
+
+    fn go_to(&mut self, number: u32) -> Outcome<()> {
+        self.state.jump = Some(Jump::Goto { number });
+        self.execute_jump()
+    }
+
+    /// Begins a loop, or skips it.
+    fn begin_loop(&mut self, place: Place, number: u32, is_true: bool) -> Outcome<()> {
+        if is_true {
+            if self.flow.loops.len() >= MAX_SUBPROGRAMS {
+                self.flow.loops.clear();
+            }
+            self.flow.loops.insert((self.flow.calls.len(), number), place);
+            return Ok(());
+        }
+        loop {
+            let read = self.source.read(&mut self.line.raw);
+            if !read? {
+                return Err(format!("WHILE DO{number} without END{number}"));
+            }
+            if self.line.compact(self.state.dialect).is_err() || !self.line.text.starts_with(b"end") {
+                continue;
+            }
+            let found = loop_number(&mut Scanner::new(&self.line.text, &self.state), "end");
+            if found == Ok(number) {
+                return Ok(());
+            }
+        }
+    }
+}
+
+/// Returns true for a condition that is not 0.
+fn is_true(value: f64) -> bool {
+    value != 0.0 && !value.is_nan()
+}
+
+/// Reads the number of a loop after its keyword.
+fn loop_number(scanner: &mut Scanner<'_>, keyword: &str) -> Outcome<u32> {
+    let text = scanner.found();
+    let number = if scanner.skip(keyword) { integer(scanner.value()?) } else { None };
+    number.ok_or_else(|| format!("{text}: {} requires its number, as in {0}1", keyword.to_uppercase()))
+}
+
+/// Reads the number of a line after GOTO.
+fn jump_target(scanner: &mut Scanner<'_>) -> Outcome<u32> {
+    scanner.skip("goto");
+    let value = scanner.value()?;
+    integer(value).ok_or_else(|| format!("GOTO {value}: the number of a line is an integer"))
+}

@@ -1,0 +1,260 @@
+//! Motions of a block: lines, polar coordinates, machine coordinates, corners.
+
+use std::f64::consts::TAU;
+
+use virtual_axes_core::units::DEGREE;
+
+use super::super::contour::Corner;
+use super::super::error::Outcome;
+use super::super::limits::MAX_RATE;
+use super::super::state::{State, is_rotary};
+use super::Sinumerik;
+use super::modes::MotionMode;
+use super::words::{Approach, Words};
+use crate::motion::{AXIS_LETTERS, Coordinates, PlanarArc};
+
+/// Sine of an angle below which three points are on a line.
+pub(super) const STRAIGHT: f64 = 1e-9;
+/// Letters of the center along X, Y and Z.
+pub(super) const CENTERS: [&str; 3] = ["I", "J", "K"];
+/// Addresses that move an axis without an axis word.
+const MOVING: [&str; 10] = ["AP", "RP", "AR", "I", "J", "K", "CR", "A3", "B3", "C3"];
+const ANGLES: [&str; 3] = ["A2", "B2", "C2"];
+
+/// Frames that a block suppresses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Suppression {
+    None,
+    /// G53, G153, SUPA: axis positions.
+    All,
+}
+
+impl Sinumerik {
+    /// Returns true if a block moves axes.
+    pub(super) fn moves(&self, words: &Words) -> bool {
+        words.has_axis() || MOVING.iter().chain(&ANGLES).any(|address| words.has(address))
+    }
+
+    /// Executes the motion of a block.
+    pub(super) fn motion(
+        &mut self,
+        words: &mut Words,
+        suppression: Suppression,
+        state: &mut State,
+    ) -> Outcome<()> {
+        require_axes(words, state)?;
+        if suppression == Suppression::All {
+            return self.machine_motion(words, state);
+        }
+        let start = state.programmed();
+        let axis = self.tool_axis(words, state)?;
+        let mut end = self.targets(words, &start, state)?;
+        if let Some(axis) = &axis {
+            let rotary = self.rotary_axes(axis, state)?;
+            (3..6).for_each(|index| end[index] = rotary[index] - state.origin(index));
+        }
+        let mode = self.modes.motion;
+        let corner = self.corner(words, state)?;
+        if mode != MotionMode::Rapid {
+            state.corner = corner;
+        }
+        match mode {
+            MotionMode::Rapid | MotionMode::Line => {
+                if let Some(angle) = words.number("ANG")? {
+                    complete_line(&start, &mut end, angle, state)?;
+                }
+                let is_rapid = mode == MotionMode::Rapid;
+                match axis {
+                    Some(axis) => self.line_with_vector(&end, &axis, is_rapid, state)?,
+                    None if is_rapid => state.rapid_to(&end)?,
+                    None => state.line_to(&end)?,
+                }
+                self.note_tangent(&start, &end, None, state);
+            }
+            _ => {
+                let arc = self.circle(words, &start, &mut end, state)?;
+                self.note_tangent(&start, &end, arc.as_ref(), state);
+                match arc {
+                    Some(arc) => state.arc_to(&arc, &end)?,
+                    None => state.line_to(&end)?,
+                }
+            }
+        }
+        // Without a motion, as after a word that keeps its place, there is no corner.
+        state.corner = None;
+        Ok(())
+    }
+
+    /// Moves to axis positions: SUPA, G53, G153.
+    fn machine_motion(&mut self, words: &mut Words, state: &mut State) -> Outcome<()> {
+        if state.modal.tcp_length.is_some() {
+            return Err("axis positions (SUPA, G53, G153) with TRAORI: program TRAFOOF first".to_owned());
+        }
+        state.moves_in_machine_coordinates = true;
+        let mut end = state.position;
+        for (axis, word) in words.axes.iter_mut().enumerate() {
+            let Some((value, approach)) = word.take() else { continue };
+            let value = value * state.unit(axis);
+            let tool = if axis == 2 { state.offsets.tool_length } else { 0.0 };
+            end[axis] = match approach {
+                Approach::Incremental => end[axis] + value,
+                Approach::Modal if state.modal.is_incremental => end[axis] + value,
+                _ => value + tool,
+            };
+        }
+        match self.modes.motion {
+            MotionMode::Rapid => state.push_rapid(end),
+            MotionMode::Line => state.push_feed(crate::motion::MotionKind::Line, end),
+            _ => Err("SUPA, G53 and G153 require G0 or G1".to_owned()),
+        }
+    }
+
+    /// Returns the end of a motion by axis words or polar coordinates, which then count as used.
+    fn targets(&mut self, words: &mut Words, start: &Coordinates, state: &State) -> Outcome<Coordinates> {
+        let mut end = *start;
+        for (axis, word) in words.axes.iter_mut().enumerate() {
+            let Some((value, approach)) = word.take() else { continue };
+            let value = value * state.unit(axis);
+            if matches!(approach, Approach::Shortest | Approach::Positive | Approach::Negative)
+                && !is_rotary(axis)
+            {
+                return Err(format!("word {}: DC, ACP and ACN require a rotary axis", AXIS_LETTERS[axis]));
+            }
+            let turns = (start[axis] - value) / TAU;
+            end[axis] = match approach {
+                Approach::Modal if state.modal.is_incremental => start[axis] + value,
+                Approach::Modal | Approach::Absolute => value,
+                Approach::Incremental => start[axis] + value,
+                Approach::Shortest => value + TAU * turns.round(),
+                // Within rounding the axis is there already.
+                Approach::Positive => value + TAU * (turns - 1e-12).ceil(),
+                Approach::Negative => value + TAU * (turns + 1e-12).floor(),
+            };
+        }
+        if words.has("AP") || words.has("RP") {
+            let [first, second, _] = state.modal.plane.axes();
+            let length = state.modal.length;
+            let angle = words.take("AP");
+            let radius = words.take("RP");
+            if let Some(radius) = radius {
+                let value = radius.value.number()? * length;
+                let is_incremental = radius.approach == Approach::Incremental;
+                self.modes.polar[0] = if is_incremental { self.modes.polar[0] + value } else { value };
+            } else {
+                let offset = [start[first] - self.modes.pole[0], start[second] - self.modes.pole[1]];
+                self.modes.polar[0] = offset[0].hypot(offset[1]);
+            }
+            if let Some(angle) = angle {
+                let value = angle.value.number()? * DEGREE;
+                let is_incremental = angle.approach == Approach::Incremental;
+                self.modes.polar[1] = if is_incremental { self.modes.polar[1] + value } else { value };
+            }
+            let [radius, angle] = self.modes.polar;
+            end[first] = self.modes.pole[0] + radius * angle.cos();
+            end[second] = self.modes.pole[1] + radius * angle.sin();
+            self.is_polar = true;
+        } else {
+            self.is_polar = false;
+        }
+        Ok(end)
+    }
+
+    /// Returns the corner that RND, CHF, CHR or RNDM give to the end of the motion.
+    fn corner(&mut self, words: &mut Words, state: &State) -> Outcome<Option<Corner>> {
+        let length = state.modal.length;
+        let mut take = |name: &str| -> Outcome<Option<f64>> {
+            Ok(words.positive(name, MAX_RATE)?.map(|value| value * length))
+        };
+        let (round, chamfer, leg) = (take("RND")?, take("CHF")?, take("CHR")?);
+        if let Some(rounding) = take("RNDM")? {
+            self.modes.rounding = rounding;
+        }
+        let modal = Some(self.modes.rounding);
+        let corner = match (round, chamfer, leg) {
+            (_, Some(length), _) => Some(length).filter(|size| *size > 0.0).map(Corner::ChamferLength),
+            (_, _, Some(leg)) => Some(leg).filter(|size| *size > 0.0).map(Corner::Chamfer),
+            (round, _, _) => round.or(modal).filter(|size| *size > 0.0).map(Corner::Round),
+        };
+        Ok(corner)
+    }
+
+    /// Stores the tangent of the last motion in the plane, in programmed coordinates, for CT.
+    pub(super) fn note_tangent(
+        &mut self,
+        start: &Coordinates,
+        end: &Coordinates,
+        arc: Option<&PlanarArc>,
+        state: &State,
+    ) {
+        let plane = state.modal.plane;
+        let [first, second, _] = plane.axes();
+        let direction = match arc {
+            Some(arc) => {
+                let radius = [end[first] - arc.center[0], end[second] - arc.center[1]];
+                let sign = arc.sweep.signum();
+                [-radius[1] * sign, radius[0] * sign]
+            }
+            None => [end[first] - start[first], end[second] - start[second]],
+        };
+        let length = direction[0].hypot(direction[1]);
+        if length > 1e-12 {
+            self.tangent = Some((plane, direction.map(|value| value / length)));
+        }
+    }
+
+    /// Taps along the plane's normal at the feed of a pitch: G331, G332 and G33 of one axis.
+    pub(super) fn tap(&mut self, words: &mut Words, state: &mut State) -> Outcome<()> {
+        let pitches = CENTERS.map(|name| words.number(name));
+        let mut pitch = 0.0;
+        for value in pitches {
+            pitch = value?.unwrap_or(0.0).abs().max(pitch);
+        }
+        if pitch == 0.0 {
+            return Err("G331 and G332 require the pitch I, J or K".to_owned());
+        }
+        let speed = state.modal.spindle_speed;
+        if speed <= 0.0 {
+            return Err("G331 and G332 require the spindle speed S".to_owned());
+        }
+        let feed = state.modal.feed.replace([pitch * state.modal.length * speed; 2]);
+        let mode = std::mem::replace(&mut state.modal.feed_mode, super::super::codes::FeedMode::PerMinute);
+        let start = state.programmed();
+        let end = self.targets(words, &start, state)?;
+        let result = state.line_to(&end);
+        (state.modal.feed, state.modal.feed_mode) = (feed, mode);
+        result
+    }
+}
+
+/// Rejects words of axes that the machine lacks.
+fn require_axes(words: &Words, state: &State) -> Outcome<()> {
+    for (axis, letter) in AXIS_LETTERS.into_iter().enumerate() {
+        if words.axes[axis].is_some() && !state.options.axes[axis] {
+            let known = AXIS_LETTERS.into_iter().zip(state.options.axes).filter(|(_, has)| *has);
+            let known = known.map(|(letter, _)| letter.to_string()).collect::<Vec<_>>().join(" ");
+            return Err(format!("word {letter}: the machine has no axis {letter}; axes: {known}"));
+        }
+    }
+    Ok(())
+}
+
+/// Completes the end of a line by its angle ANG and one coordinate.
+fn complete_line(start: &Coordinates, end: &mut Coordinates, angle: f64, state: &State) -> Outcome<()> {
+    let [first, second, _] = state.modal.plane.axes();
+    let (sine, cosine) = (angle * DEGREE).sin_cos();
+    let moves = [first, second].map(|axis| end[axis] != start[axis]);
+    match moves {
+        [true, false] if cosine.abs() > STRAIGHT => {
+            end[second] = start[second] + (end[first] - start[first]) * sine / cosine;
+            Ok(())
+        }
+        [false, true] if sine.abs() > STRAIGHT => {
+            end[first] = start[first] + (end[second] - start[second]) * cosine / sine;
+            Ok(())
+        }
+        _ => {
+            Err("ANG requires one coordinate of the plane; post contours of two lines with their end points"
+                .to_owned())
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Work offsets as texts: `G54=120,80,-350`.
+
+use std::str::FromStr;
+
+use virtual_axes_core::units::{DEGREE, MILLIMETER};
+
+use super::limits::MAX_LENGTH;
+use super::options::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
+use super::state::is_rotary;
+use crate::motion::{AXIS_COUNT, Coordinates};
+
+/// Work offset that is given to the interpreter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WorkOffset {
+    /// Index in the work offsets.
+    pub index: usize,
+    /// Axis positions at programmed coordinate 0, m and rad.
+    pub coordinates: Coordinates,
+}
+
+impl FromStr for WorkOffset {
+    type Err = String;
+
+    /// Reads `G54=X,Y,Z`, `G59.1=…`, `G54.1P7=…` or `G154P7=…`, in mm, and up to three angles in degrees.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let required =
+            || format!("{text}: must be a work coordinate system with X,Y,Z in mm, as in G54=120,80,-350");
+        let (name, values) = text.split_once('=').ok_or_else(required)?;
+        let index = index(&name.trim().to_ascii_uppercase().replace(' ', "")).ok_or_else(required)?;
+        let mut coordinates = [0.0; AXIS_COUNT];
+        let mut count = 0;
+        for value in values.split(',') {
+            let number = value.trim().parse::<f64>().ok().filter(|number| number.is_finite());
+            let unit = if is_rotary(count) { DEGREE } else { MILLIMETER };
+            let number = number.map(|number| number * unit).filter(|number| number.abs() <= MAX_LENGTH);
+            *coordinates.get_mut(count).ok_or_else(required)? = number.ok_or_else(required)?;
+            count += 1;
+        }
+        if count < 3 { Err(required()) } else { Ok(Self { index, coordinates }) }
+    }
+}
+
+/// Returns the index of a work coordinate system by its code.
+fn index(name: &str) -> Option<usize> {
+    if let Some(number) = name.strip_prefix("G54.1P").or_else(|| name.strip_prefix("G154P")) {
+        let number = number.parse().ok().filter(|number| (1..=ADDITIONAL_OFFSET_COUNT).contains(number))?;
+        return Some(WORK_OFFSET_COUNT - 1 + number);
+    }
+    (0..WORK_OFFSET_COUNT).find(|index| super::system_name(*index) == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_offsets_are_read_in_millimeters_and_degrees() {
+        let offset: WorkOffset = "G55=10,-20.5,0,0,90".parse().unwrap();
+        assert_eq!(offset.index, 1);
+        assert_eq!(offset.coordinates[..3], [0.01, -0.0205, 0.0]);
+        assert!((offset.coordinates[4] - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+        for (text, index) in [("g59.3=0,0,0", 8), ("G54.1 P1=0,0,0", 9), ("G154P300=1,2,3", 308)] {
+            assert_eq!(text.parse::<WorkOffset>().map(|offset| offset.index), Ok(index), "{text}");
+        }
+        for text in ["", "G54", "G54=1,2", "G53=1,2,3", "G54=1,2,x", "G154P301=0,0,0", "G54=1,2,1e99"] {
+            assert!(text.parse::<WorkOffset>().is_err(), "{text}");
+        }
+    }
+}

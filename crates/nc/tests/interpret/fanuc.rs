@@ -1,0 +1,399 @@
+//! Programs in the manner of Fanuc and Haas: their motions follow from closed forms.
+
+use virtual_axes_core::config::{MachineConfig, Parameters};
+use virtual_axes_nc::interpret::{Dialect, InterpreterOptions, TipTransform, Tool};
+use virtual_axes_nc::motion::{MotionKind, ProgramEvent, ProgramMotion};
+
+use crate::common::{events, millimeters, motions, steps};
+
+fn options(dialect: Dialect) -> InterpreterOptions {
+    let mut options = InterpreterOptions { dialect: Some(dialect), ..InterpreterOptions::default() };
+    for (number, length, radius) in [(1, 0.050, 0.005), (2, 0.040, 0.002)] {
+        options.tools.insert(number, Tool { length, radius, name: None });
+    }
+    options
+}
+
+/// Returns X, Y and Z at the end of each motion, mm.
+fn ends(dialect: Dialect, text: &str) -> Vec<[f64; 3]> {
+    motions(text, options(dialect)).iter().map(|motion| millimeters(&motion.end)).collect()
+}
+
+fn assert_ends(dialect: Dialect, text: &str, expected: &[[f64; 3]]) {
+    let found = ends(dialect, text);
+    let differs = |(found, expected): (&[f64; 3], &[f64; 3])| {
+        found.iter().zip(expected).any(|(found, expected)| (found - expected).abs() > 1e-6)
+    };
+    let is_wrong = found.len() != expected.len() || found.iter().zip(expected).any(differs);
+    assert!(!is_wrong, "{text}\nfound {found:?}\nexpected {expected:?}");
+}
+
+/// Returns the duration of all dwells, s.
+fn dwells(dialect: Option<Dialect>, text: &str) -> f64 {
+    let options = InterpreterOptions { dialect, ..InterpreterOptions::default() };
+    let dwell = |(_, event)| if let ProgramEvent::Dwell(time) = event { time } else { 0.0 };
+    events(text, options).into_iter().map(dwell).sum()
+}
+
+#[test]
+fn loops_and_jumps_of_macro_b_drill_a_row_of_holes() {
+    let text = "%\nO0010(ROW)\nG21G90G0X0Y0Z5.\n#1=0\nWHILE[#1LT3]DO1\nG0X[#1*10.]\nG1Z-2.F100.\nG0Z5.\n#1=#1+1\nEND1\n\
+                N5#2=#2+1\nG0Y[#2*4.]\nIF[#2NE2]GOTO5\nIF[#2EQ2]THEN#3=7.\nG0X#3\nM30\n%\n";
+    let mut expected = vec![[0.0, 0.0, 5.0]];
+    for hole in 0..3 {
+        let x = 10.0 * f64::from(hole);
+        if hole > 0 {
+            expected.push([x, 0.0, 5.0]);
+        }
+        expected.extend([[x, 0.0, -2.0], [x, 0.0, 5.0]]);
+    }
+    expected.extend([[20.0, 4.0, 5.0], [20.0, 8.0, 5.0], [7.0, 8.0, 5.0]]);
+    assert_ends(Dialect::Fanuc, text, &expected);
+}
+
+#[test]
+fn variables_without_value_are_told_from_zero() {
+    let text = "O1\nG0 X1. Y1.\nG65 P9000 A5. B0\nG65 P9000 B3.\nM30\nO9000\nIF[#1EQ#0]GOTO9\nG0 X#1 Y#2 Z#3\nM99\n\
+                N9 G0 X[#1+2.] Y#2\nM99\n";
+    assert_ends(Dialect::Fanuc, text, &[[1.0, 1.0, 0.0], [5.0, 0.0, 0.0], [2.0, 3.0, 0.0]]);
+}
+
+#[test]
+fn macro_functions_are_those_of_the_control() {
+    let text = "O1\nG0 X[FIX[-1.5]] Y[FUP[1.2]] Z[-7.MOD4.]\nX[ATAN[1.]/[1.]] Y[ATAN[1.,0.]] Z[POW[2.,3.]]\n\
+                X[6AND3] Y[6OR3] Z[6XOR3]\nX[ROUND[2.5]] Y[ABS[-3.]] Z[SQRT[16.]]\nM30\n";
+    let expected = [[-1.0, 2.0, -3.0], [45.0, 90.0, 8.0], [2.0, 7.0, 5.0], [3.0, 3.0, 4.0]];
+    assert_ends(Dialect::Fanuc, text, &expected);
+}
+
+#[test]
+fn subprograms_repeat_and_return_to_lines() {
+    // P30020 calls program 20 three times, L twice; M99 P jumps to a line of the caller.
+    let text =
+        "O1\nG91\nM98 P30020\nM98 P20 L2\nM98 P21\nG0 X100.\nN7 G0 Y1.\nM30\nO20\nG0 X1.\nM99\nO21\nM99 P7\n";
+    let mut expected: Vec<_> = (1..=5).map(|x| [f64::from(x), 0.0, 0.0]).collect();
+    expected.push([5.0, 1.0, 0.0]);
+    assert_ends(Dialect::Fanuc, text, &expected);
+    // M97 of Haas calls the lines from a number on.
+    let text = "O1\nG91 G0\nM97 P100 L2\nM30\nN100 X2.\nM99\n";
+    assert_ends(Dialect::Haas, text, &[[2.0, 0.0, 0.0], [4.0, 0.0, 0.0]]);
+}
+
+#[test]
+fn a_modal_macro_follows_each_motion() {
+    let text = "O1\nG66 P50 Z-3.\nG0 X1.\nG0 X2.\nG67\nG0 X3.\nM30\nO50\nG1 Z#26 F100.\nG0 Z0\nM99\n";
+    let expected = [
+        [1.0, 0.0, 0.0],
+        [1.0, 0.0, -3.0],
+        [1.0, 0.0, 0.0],
+        [2.0, 0.0, 0.0],
+        [2.0, 0.0, -3.0],
+        [2.0, 0.0, 0.0],
+    ];
+    assert_ends(Dialect::Fanuc, text, &[&expected[..], &[[3.0, 0.0, 0.0]]].concat());
+}
+
+#[test]
+fn dwells_have_the_unit_of_the_dialect() {
+    let text = "G21 G90\nG0 Z5.\nG82 X1. Z-1. R1. P500 F100\nG80\nG4 X1.5\nG4 U0.5\nG4 P250\nM30\n";
+    assert!((dwells(Some(Dialect::Fanuc), text) - 2.75).abs() < 1e-12);
+    assert!((dwells(None, text) - 2.75).abs() < 1e-12, "detected by G4 X and U");
+    assert!((dwells(Some(Dialect::Fanuc), "G4 P0.4\n") - 0.4).abs() < 1e-12, "s with a decimal point");
+    assert!((dwells(Some(Dialect::Haas), "G4 P2.\nG4 P500\n") - 2.5).abs() < 1e-12);
+    assert!((dwells(Some(Dialect::LinuxCnc), "G4 P2.\nG4 P500\n") - 502.0).abs() < 1e-12);
+}
+
+#[test]
+fn references_and_machine_coordinates_have_each_form() {
+    let text = "O1\nG54 G90 G0 X5. Y6. Z7.\nG91 G28 Z0\nG28 X0 Y0\nG90 X1. Y2. Z3.\nG28 U0 W0\nG53 X-10.\nG53 G0 Z-1.\n\
+                G30 P2 Z5.\nG0 X4.\nM30\n";
+    let mut options = options(Dialect::Fanuc);
+    options.work_offsets[0][..3].copy_from_slice(&[0.1, 0.2, 0.3]);
+    options.references[1][2] = 0.05;
+    options.axes[6..].fill(false);
+    let found: Vec<_> = motions(text, options).iter().map(|motion| millimeters(&motion.end)).collect();
+    let expected = [
+        [105.0, 206.0, 307.0],
+        [105.0, 206.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [101.0, 202.0, 303.0],
+        [0.0, 202.0, 0.0],
+        [-10.0, 202.0, 0.0],
+        [-10.0, 202.0, -1.0],
+        [-10.0, 202.0, 305.0],
+        [-10.0, 202.0, 50.0],
+        [104.0, 202.0, 50.0],
+    ];
+    for (found, expected) in found.iter().zip(&expected) {
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?} {expected:?}");
+    }
+    assert_eq!(found.len(), expected.len());
+}
+
+#[test]
+fn additional_work_offsets_and_tool_data_are_set_by_the_program() {
+    let text = "O1\nG90 G10 L20 P3 X10. Y20.\nG10 L2 P2 Z5.\nG10 L10 P7 R30.\nG54.1 P3 G0 X1. Y1.\nG55 Z1.\n\
+                G43 H7 Z0\nG49 Z0\n#5241=4.\nX0\n#5242=#5241*2\nY0\nM30\n";
+    let expected = [
+        [11.0, 21.0, 0.0],
+        [11.0, 21.0, 6.0],
+        [11.0, 21.0, 35.0],
+        [11.0, 21.0, 5.0],
+        [4.0, 21.0, 5.0],
+        [4.0, 8.0, 5.0],
+    ];
+    assert_ends(Dialect::Fanuc, text, &expected);
+    let text = "%\nO2\nG154 P2 G0 X1.\nG111 X2.\nG110 X3.\nM30\n%";
+    let mut options = options(Dialect::Haas);
+    options.work_offsets[10][0] = 0.1;
+    let x: Vec<_> = motions(text, options).iter().map(|motion| (motion.end[0] * 1e3).round()).collect();
+    assert_eq!(x, [101.0, 102.0, 3.0]);
+}
+
+#[test]
+fn rotation_scaling_and_mirroring_act_about_their_centers() {
+    // 90° about (10, 0): (20, 0) becomes (10, 10).
+    assert_ends(
+        Dialect::Fanuc,
+        "G68 X10. Y0 R90.\nG0 X20. Y0\nG69\nX20. Y0\nM30\n",
+        &[[10.0, 10.0, 0.0], [20.0, 0.0, 0.0]],
+    );
+    // P2000 is a factor of 2 about (1, 1); then I, J and K.
+    assert_ends(Dialect::Fanuc, "G51 X1. Y1. P2000\nG0 X3. Y4.\nG50\nM30\n", &[[5.0, 7.0, 0.0]]);
+    assert_ends(
+        Dialect::Haas,
+        "G51 X0 Y0 Z0 P3.\nG0 X1. Y1. Z-1.\nG50\nG0 X1.\nM30\n",
+        &[[3.0, 3.0, -3.0], [1.0, 3.0, -3.0]],
+    );
+    assert_ends(
+        Dialect::Fanuc,
+        "G51.1 X5.\nG0 X6. Y1.\nG50.1 X0\nG0 X6.\nM30\n",
+        &[[4.0, 1.0, 0.0], [6.0, 1.0, 0.0]],
+    );
+    assert_ends(
+        Dialect::Haas,
+        "G101 X0\nG0 X6. Y1.\nG100 X0\nG0 X6.\nM30\n",
+        &[[-6.0, 1.0, 0.0], [6.0, 1.0, 0.0]],
+    );
+}
+
+#[test]
+fn a_mirrored_arc_turns_the_other_way_and_a_scaled_one_keeps_its_center() {
+    let arc =
+        |text: &str| match motions(text, options(Dialect::Fanuc)).last().map(|motion| motion.kind.clone()) {
+            Some(MotionKind::Arc(arc)) => arc,
+            other => panic!("{other:?}"),
+        };
+    let plain = arc("G0 X10. Y0\nG3 X0 Y10. I-10. J0 F100.\nM30\n");
+    let mirrored = arc("G51.1 X0\nG0 X10. Y0\nG3 X0 Y10. I-10. J0 F100.\nM30\n");
+    assert!((plain.sweep + mirrored.sweep).abs() < 1e-12);
+    let turned = arc("G68 X0 Y0 R90.\nG0 X20. Y5.\nG3 X10. Y15. I-10. J0 F100.\nM30\n");
+    assert!(
+        (turned.center[0] + 0.005).abs() < 1e-12 && (turned.center[1] - 0.010).abs() < 1e-12,
+        "{turned:?}"
+    );
+    // Different factors make an ellipse: half axes 20 and 10 mm.
+    let chords =
+        motions("G51 X0 Y0 I2. J1.\nG0 X10. Y0\nG3 X10. Y0 I-10. J0 F100.\nM30\n", options(Dialect::Haas));
+    assert!(chords.len() > 100);
+    for motion in &chords[1..] {
+        let [x, y, _] = millimeters(&motion.end);
+        assert!(((x / 20.0).powi(2) + (y / 10.0).powi(2) - 1.0).abs() < 1e-9, "{x} {y}");
+    }
+}
+
+#[test]
+fn polar_coordinates_have_radius_and_angle() {
+    let text = "G17 G90 G16\nG0 X10. Y30.\nY150.\nG91 Y30.\nG15 G90\nX1. Y1.\nM30\n";
+    let at =
+        |radius: f64, angle: f64| [radius * angle.to_radians().cos(), radius * angle.to_radians().sin(), 0.0];
+    assert_ends(Dialect::Fanuc, text, &[at(10.0, 30.0), at(10.0, 150.0), at(10.0, 180.0), [1.0, 1.0, 0.0]]);
+}
+
+#[test]
+fn corners_are_rounded_and_chamfered() {
+    // Right angle at (20, 0): an arc of 5 mm from (15, 0) to (20, 5), then a chamfer of 3 mm at (20, 20).
+    let text = "G90 G1 X20. ,R5. F500.\nY20. ,C3.\nX0\nM30\n";
+    let expected =
+        [[15.0, 0.0, 0.0], [20.0, 5.0, 0.0], [20.0, 17.0, 0.0], [17.0, 20.0, 0.0], [0.0, 20.0, 0.0]];
+    assert_ends(Dialect::Haas, text, &expected);
+    let found = motions(text, options(Dialect::Haas));
+    let MotionKind::Arc(arc) = &found[1].kind else { panic!("{:?}", found[1]) };
+    assert!((arc.center[0] - 0.015).abs() < 1e-12 && (arc.center[1] - 0.005).abs() < 1e-12);
+    let error = steps("G1 X2. ,R5. F500.\nY20.\nM30\n", options(Dialect::Haas)).expect_err("too short");
+    assert_eq!(
+        error.to_string(),
+        "part.nc:2: the corner of 5 mm does not fit between the motions of lines 1 and 2"
+    );
+}
+
+#[test]
+fn boring_and_tapping_cycles_follow_their_sequences() {
+    // G76 shifts by Q at the depth, rises and shifts back.
+    let expected = [
+        [5.0, 0.0, 10.0],
+        [5.0, 0.0, 2.0],
+        [5.0, 0.0, -8.0],
+        [5.5, 0.0, -8.0],
+        [5.5, 0.0, 10.0],
+        [5.0, 0.0, 10.0],
+    ];
+    let text = "G90 G0 Z10.\nG98 G76 X5. Z-8. R2. Q0.5 P100 F80.\nG80\nM30\n";
+    assert_ends(Dialect::Fanuc, text, &[&[[0.0, 0.0, 10.0]], &expected[..]].concat());
+    let text = "S500 M3\nG90 G0 Z10.\nG99 G84 X5. Z-8. R2. F625.\nG80\nM30\n";
+    let expected = [[0.0, 0.0, 10.0], [5.0, 0.0, 10.0], [5.0, 0.0, 2.0], [5.0, 0.0, -8.0], [5.0, 0.0, 2.0]];
+    assert_ends(Dialect::Fanuc, text, &expected);
+    let spindle: Vec<f64> = events(text, options(Dialect::Fanuc))
+        .into_iter()
+        .filter_map(
+            |(_, event)| if let ProgramEvent::Spindle(speed) = event { Some(speed.signum()) } else { None },
+        )
+        .collect();
+    assert_eq!(spindle, [1.0, -1.0, 1.0]);
+    // G87 passes the hole with a shift and bores upward.
+    let text = "G90 G0 Z10.\nG98 G87 X5. Z-3. R-12. Q0.5 F80.\nG80\nM30\n";
+    let expected = [
+        [0.0, 0.0, 10.0],
+        [5.0, 0.0, 10.0],
+        [5.5, 0.0, 10.0],
+        [5.5, 0.0, -12.0],
+        [5.0, 0.0, -12.0],
+        [5.0, 0.0, -3.0],
+        [5.5, 0.0, -3.0],
+        [5.5, 0.0, 10.0],
+        [5.0, 0.0, 10.0],
+    ];
+    assert_ends(Dialect::Fanuc, text, &expected);
+}
+
+#[test]
+fn pecks_of_haas_become_smaller_down_to_the_least_one() {
+    // Depth 10 mm below R: pecks of 4, 3, 2 and 2 mm, at Z −3, −6, −8 and −9.
+    let text = "G90 G0 Z1.\nG99 G83 X0 Y0 Z-9. R1. I4. J1. K2. F100.\nG80\nM30\n";
+    let depths: Vec<f64> = motions(text, options(Dialect::Haas))
+        .iter()
+        .filter(|motion| motion.kind == MotionKind::Line)
+        .map(|motion| (motion.end[2] * 1e6).round() / 1e3)
+        .collect();
+    assert_eq!(depths, [-3.0, -6.0, -8.0, -9.0]);
+}
+
+#[test]
+fn circular_pockets_end_at_their_centers() {
+    // I4 with a tool of radius 2: circles of 2 mm; K8 in steps of 2: circles of 2, 4 and 6 mm.
+    let circles = |text: &str| -> Vec<f64> {
+        let full = |motion: &ProgramMotion| match &motion.kind {
+            MotionKind::Arc(arc) if arc.sweep.abs() > 6.0 => Some(
+                ((motion.start[0] - arc.center[0]).hypot(motion.start[1] - arc.center[1]) * 1e6).round()
+                    / 1e3,
+            ),
+            _ => None,
+        };
+        let found = motions(text, options(Dialect::Haas));
+        assert!(millimeters(&found[found.len() - 1].end)[..2].iter().all(|value| value.abs() < 1e-9));
+        found.iter().filter_map(full).collect()
+    };
+    assert_eq!(circles("G1 Z0.1 F100.\nG12 I4. D2 F200.\nM30\n"), [2.0]);
+    assert_eq!(circles("G1 Z0.1 F100.\nG13 I4. K8. Q2. D2 F200.\nM30\n"), [2.0, 4.0, 6.0]);
+}
+
+#[test]
+fn words_without_motion_are_counted() {
+    let text = "%\nO7\nG05.1 Q1\nG08 P1\nG187 P3 E0.01\nM29 S500\nM88\nM88\nG0 X1. M89\nM30\n%";
+    let options = InterpreterOptions { reports_all_errors: true, ..options(Dialect::Haas) };
+    let mut interpreter =
+        virtual_axes_nc::interpret::Interpreter::new(std::io::Cursor::new(text), "part.nc", options);
+    assert_eq!(interpreter.by_ref().filter(Result::is_ok).count(), 2);
+    let report = interpreter.report();
+    assert!(report.errors.is_empty(), "{report:?}");
+    let codes: Vec<_> =
+        report.without_effect.iter().map(|(code, found)| (code.as_str(), found.count)).collect();
+    assert_eq!(codes, [("G187", 1), ("G5.1", 1), ("G8", 1), ("M29", 1), ("M88", 2), ("M89", 1)]);
+}
+
+#[test]
+fn alarms_and_missing_lines_are_rejected() {
+    for (text, expected) in [
+        ("O1\n#3000=5(TOO DEEP)\n", "part.nc:2: alarm of the program: #3000=5"),
+        ("O1\nGOTO 5\n", "part.nc:2: N5: no such line in the program that runs"),
+        ("O1\nWHILE[1EQ0]DO2\n", "part.nc:2: WHILE DO2 without END2"),
+        ("O1\nEND1\n", "part.nc:2: END1 without DO1"),
+        ("O1\nG65 A1.\n", "part.nc:2: G65 requires P, the number of the macro"),
+        ("O1\nG150 P5 X1.\n", "part.nc:2: G150 is not supported in the dialect haas: pocket milling"),
+        (
+            "O1\nG31 Z-5. F10.\n",
+            "part.nc:2: G31 is not supported in the dialect haas: probing needs a workpiece",
+        ),
+        ("O1\nIF[#1EQ1]X5.\n", "part.nc:2: X5.: IF requires GOTO or THEN"),
+    ] {
+        let error = steps(text, options(Dialect::Haas)).expect_err(text).to_string();
+        assert!(error.starts_with(expected), "{text:?}: {error}");
+    }
+}
+
+/// Returns the default machine, whose tool table moves A and C.
+fn five_axes() -> MachineConfig {
+    Parameters::embedded_default().expect("the default").machine_config().expect("a machine")
+}
+
+#[test]
+fn in_a_tilted_plane_z_is_along_the_tool_axis() {
+    let machine = five_axes();
+    let mut options =
+        InterpreterOptions { dialect: Some(Dialect::Fanuc), ..InterpreterOptions::for_machine(&machine) };
+    options.tools.insert(2, Tool { length: 0.04, ..Tool::default() });
+    let transform = TipTransform::new(&machine);
+    let text = "O1\nG21 G90 G54\nG68.2 X5. Y-3. Z2. I20. J30. K10.\nG53.1\nG43 H2 Z40.\nG1 X0 Y0 F500.\nX8. Y6.\n\
+                G3 X18. Y16. I0 J10.\nG69\nM30\n";
+    let found = motions(text, options);
+    // Tip of the tool in the workpiece frame: p = o + Rz(I) Rx(J) Rz(K) q.
+    let turn = |point: [f64; 3], axis: usize, degrees: f64| -> [f64; 3] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let [x, y, z] = point;
+        if axis == 2 {
+            [x * cos - y * sin, x * sin + y * cos, z]
+        } else {
+            [x, y * cos - z * sin, y * sin + z * cos]
+        }
+    };
+    let workpiece = machine.kinematics().workpiece;
+    let check = |motion: &ProgramMotion, point: [f64; 3]| {
+        let turned = turn(turn(turn(point, 2, 10.0), 0, 30.0), 2, 20.0);
+        let expected = [turned[0] + 5.0, turned[1] - 3.0, turned[2] + 2.0];
+        let tip = millimeters(&transform.tip_of(&motion.end, 0.04));
+        for axis in 0..3 {
+            let expected = expected[axis] + 1e3 * workpiece[axis];
+            assert!((tip[axis] - expected).abs() < 1e-9, "{point:?}: {tip:?}, expected {expected}");
+        }
+    };
+    let [.., to_zero, line, arc] = &found[..] else { panic!("{} motions", found.len()) };
+    check(to_zero, [0.0, 0.0, 40.0]);
+    check(line, [8.0, 6.0, 40.0]);
+    check(arc, [18.0, 16.0, 40.0]);
+    assert!(matches!(arc.kind, MotionKind::Arc(_)), "the table turns the plane parallel to XY");
+    assert!((line.end[3].abs() - 30_f64.to_radians()).abs() < 1e-9, "A tilts by J");
+}
+
+#[test]
+fn tool_vectors_turn_the_tables() {
+    let machine = five_axes();
+    let options =
+        InterpreterOptions { dialect: Some(Dialect::Fanuc), ..InterpreterOptions::for_machine(&machine) };
+    let text = "O1\nG90 G54\nG43.5 H0\nG0 X0 Y0 Z10. I0 J-0.5 K0.8660254037844386\nG49\nM30\n";
+    let found = motions(text, options);
+    let last = found.last().expect("a motion");
+    // u = (sin a sin c, −sin a cos c, cos a): a = 30°, c = 0.
+    assert!((last.end[3] - 30_f64.to_radians()).abs() < 1e-9 && last.end[5].abs() < 1e-9, "{last:?}");
+}
+
+#[test]
+fn references_interrupt_tool_center_point_control() {
+    let machine = five_axes();
+    let options =
+        InterpreterOptions { dialect: Some(Dialect::Fanuc), ..InterpreterOptions::for_machine(&machine) };
+    let text = "O1\nG90 G54\nG0 A20. C30.\nG43.4 H0\nG0 X10. Y-5. Z30.\nG28 G91 Z0.\nG90 G0 X1. Y2. Z30.\nG49\nM30\n";
+    let found = motions(text, options);
+    let lengths: Vec<_> = found.iter().map(|motion| motion.tcp_length.is_some()).collect();
+    assert_eq!(lengths, [false, true, false, true]);
+    assert_eq!(found[2].end[2], 0.0, "Z at its reference");
+}

@@ -1,0 +1,101 @@
+//! Programs in the manner of grbl and Mach3, comments and other texts of each control, and their detection.
+
+use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions};
+
+use crate::common::{millimeters, motions};
+
+/// Returns the detected dialect, and the ends of the motions, mm.
+fn detected(text: &str) -> (Dialect, Vec<[f64; 3]>) {
+    let interpreter =
+        Interpreter::new(std::io::Cursor::new(text.to_owned()), "part.nc", InterpreterOptions::default());
+    let dialect = interpreter.dialect().dialect;
+    let ends = motions(text, InterpreterOptions::default());
+    (dialect, ends.iter().map(|motion| millimeters(&motion.end)).collect())
+}
+
+#[test]
+fn programs_run_in_their_detected_dialects() {
+    use Dialect::{Fanuc, Grbl, Haas, LinuxCnc, Mach3};
+    for (dialect, text, last) in [
+        // Laser of a hobby machine.
+        (
+            Grbl,
+            "; grbl laser\n$H\nG21 G90\nM4 S0\nG0 X10 Y5\nS800 G1 X20 F1200\nM5 S0\nG0 X0 Y0\nM2\n",
+            [0.0, 0.0, 0.0],
+        ),
+        (
+            Grbl,
+            "(post: grbl)\nG17 G21 G90 G94 G54\nT1\nM3 S12000\nG0 Z5\nG1 Z-1 F200\nG2 X4 Y0 I2 J0 F600\nM30\n",
+            [4.0, 0.0, -1.0],
+        ),
+        (
+            Mach3,
+            "(Mach3 router post)\nG20 G90 G40 G49 G80\nG70\nM6 T1 ' quarter inch\nG0 X1. Y0\nG12 I0.5 F30\nM5 M30\n",
+            [25.4, 0.0, 0.0],
+        ),
+        (
+            Mach3,
+            "; Mach3\nG21\nG68 A0 B0 R90\nG0 X10 Y0\nG69\nG51 X2 Y3\nG0 X1 Y1\nG50\nM30\n",
+            [2.0, 3.0, 0.0],
+        ),
+        (LinuxCnc, "G21 G90 G64 P0.01\nM7\nM8\nG0 X1\nG1 X2 F100\nM9\nM2\n", [2.0, 0.0, 0.0]),
+        (LinuxCnc, "#<r>=3\nG0 X#<r>\nM2\n", [3.0, 0.0, 0.0]),
+        (
+            Fanuc,
+            "%\nO1234(NESTED (COMMENT) HERE)\nN10 G21\nN20 G0 X1. (OPEN\nN30 G90 G0 Y2.;\nM30\n%\n",
+            [1.0, 2.0, 0.0],
+        ),
+        (Fanuc, "%PM\n:0097\nG0 X3. Y1.\n/2 G0 X9. Y9.\nN5 /3 G0 X4. Y1.\nM30\n%\n", [4.0, 1.0, 0.0]),
+        (Fanuc, "<PART>\nO5 G21 G90\nG0 X3. M8 M3 S500\nG90 G91 X2. T5 D3\nM99\n", [5.0, 0.0, 0.0]),
+        (
+            Haas,
+            "%\nO00042 (VF2)\nG00 G17 G20 G40 G49 G80 G90 G54\nT1 M06\nG103 P1\nG00 X1. Y0.\nM97 P5\nM30\nN5 X2.\nM99\n%\n",
+            [50.8, 0.0, 0.0],
+        ),
+    ] {
+        let (found, ends) = detected(text);
+        assert_eq!(found, dialect, "{text}");
+        let end = ends.last().expect("a motion");
+        assert!(end.iter().zip(last).all(|(found, last)| (found - last).abs() < 1e-9), "{text}: {end:?}");
+    }
+}
+
+#[test]
+fn all_errors_of_a_program_are_reported_once_with_count_and_line() {
+    let text = "G21 G90 G17\nG15\nG187 P1\nG0 X1\nG15 G187\nM450\nG1 X10 F500\nG12 I5\nG1 X20 Q7\nM2\n";
+    let options = InterpreterOptions {
+        dialect: Some(Dialect::LinuxCnc),
+        reports_all_errors: true,
+        ..InterpreterOptions::default()
+    };
+    let mut interpreter = Interpreter::new(std::io::Cursor::new(text), "part.nc", options);
+    assert!(interpreter.by_ref().all(|step| step.is_ok()));
+    let errors = &interpreter.report().errors;
+    let mut found: Vec<_> =
+        errors.iter().map(|(text, found)| (found.first_line, found.count, text.as_str())).collect();
+    found.sort_unstable();
+    let expected = [
+        (
+            2,
+            2,
+            "G15 is not supported in the dialect linuxcnc: known in --dialect fanuc or haas or mach3; or skip it with --ignore G15",
+        ),
+        (
+            3,
+            2,
+            "G187 is not supported in the dialect linuxcnc: known in --dialect haas; or skip it with --ignore G187",
+        ),
+        (6, 1, "M450 is not supported in the dialect linuxcnc: skip it with --ignore M450"),
+        (
+            8,
+            1,
+            "G12 is not supported in the dialect linuxcnc: known in --dialect haas or mach3; or skip it with --ignore G12",
+        ),
+        (
+            9,
+            1,
+            "word Q has no effect in this line with G1: remove it, or program the code that it belongs to",
+        ),
+    ];
+    assert_eq!(found, expected);
+}

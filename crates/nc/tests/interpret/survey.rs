@@ -1,0 +1,122 @@
+//! Surveys of whole programs: all errors, travel excess with the work offset that fits, and files of subprograms.
+
+use std::fs;
+use std::path::PathBuf;
+
+use virtual_axes_core::config::{MachineConfig, Parameters};
+use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions, WorkOffset};
+use virtual_axes_nc::offline::{PartProgramOptions, ProgramSurvey};
+
+/// Folder that is removed at the end of its test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("virtual_axes_{name}_{}", std::process::id()));
+        fs::create_dir_all(&folder).expect("a folder");
+        Self(folder)
+    }
+
+    fn file(&self, name: &str, text: &str) -> String {
+        let path = self.0.join(name);
+        fs::write(&path, text).expect("a file");
+        path.to_str().expect("UTF-8").to_owned()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn machine() -> MachineConfig {
+    Parameters::embedded_default().expect("the default").machine_config().expect("a machine")
+}
+
+/// Returns the page of a program without its folder.
+fn page(folder: &Folder, text: &str, options: &PartProgramOptions) -> Option<String> {
+    let name = folder.file("part.nc", text);
+    let survey = ProgramSurvey::new::<String>(&name, &[], &machine(), options, |_| Ok(())).expect("a file");
+    survey.page(&name, &machine()).map(|page| page.replace(&name, "part.nc"))
+}
+
+#[test]
+fn a_single_error_is_one_line_and_several_are_a_page() {
+    let folder = Folder::new("survey_errors");
+    let options = PartProgramOptions::default();
+    assert_eq!(page(&folder, "G0 X1\nM2\n", &options), None);
+    let one = page(&folder, "G0 X1\nG1 F100 X2 Q5\nM2\n", &options).expect("an error");
+    assert_eq!(
+        one,
+        "part.nc:2: word Q has no effect in this line with G1: remove it, or program the code that it belongs to"
+    );
+    let many = page(&folder, "G16\nG0 X1 B5\nG16\nM200\nM2\n", &options).expect("errors");
+    let lines: Vec<&str> = many.lines().collect();
+    assert_eq!(lines[0], "part.nc: 3 errors, read in the dialect linuxcnc");
+    assert!(
+        lines[1].starts_with("part.nc:1: G16 is not supported") && lines[1].ends_with("(2 times)"),
+        "{many}"
+    );
+    assert!(lines[2].starts_with("part.nc:2: word B: the machine has no axis B"), "{many}");
+    assert!(lines[3].starts_with("part.nc:4: M200 is not supported"), "{many}");
+}
+
+#[test]
+fn travel_excess_names_the_work_offset_that_fits() {
+    let folder = Folder::new("survey_travel");
+    let machine = machine();
+    let limits = machine.axes().iter().find(|axis| axis.name() == "y").expect("y").limits();
+    let (least, most) = (limits.travel_min * 1e3, limits.travel_max * 1e3);
+    let options = PartProgramOptions::default();
+    let text = "G54 G0 X10\nG1 F100 Y-300\nY-200\nM2\n";
+    let found = page(&folder, text, &options).expect("beyond the travel");
+    let rows: Vec<Vec<&str>> = found
+        .lines()
+        .skip(1)
+        .map(|row| row.split("  ").map(str::trim).filter(|cell| !cell.is_empty()).collect())
+        .collect();
+    assert!(found.starts_with("part.nc:2: y at -0.3 m (-300 mm) is outside of its travel limits"), "{found}");
+    assert_eq!(rows[0], ["axis", "program", "travel", "work offset that fits"]);
+    let fit = format!("G54 Y: {} mm to {} mm (now 0 mm)", least + 300.0, most + 200.0);
+    assert_eq!(rows[1], ["y", "-300 mm to -200 mm", &format!("{least} mm to {most} mm"), fit.as_str()]);
+    // With an offset within this range the program is valid.
+    let offset = format!("G54=0,{},0", least + 300.0);
+    let work_offsets = vec![offset.parse::<WorkOffset>().expect("an offset")];
+    assert_eq!(page(&folder, text, &PartProgramOptions { work_offsets, ..options.clone() }), None);
+    let machine_coordinates = page(&folder, "G53 G0 Y-300\nM2\n", &options).expect("beyond the travel");
+    assert!(
+        machine_coordinates.contains("machine coordinates (G53, G28): change the program"),
+        "{machine_coordinates}"
+    );
+}
+
+#[test]
+fn subprograms_stand_in_files_beside_the_program() {
+    let folder = Folder::new("survey_files");
+    folder.file("drill.ngc", "o<drill> sub\nG0 X#1\nG0 X0\no<drill> endsub\nM2\n");
+    folder.file("O0020.nc", "%\nO0020 (SUB)\nG91 G0 Y1.\nG90\nM99\n%\n");
+    folder.file("faulty.ngc", "o<faulty> sub\nG0 X1 Q7\no<faulty> endsub\n");
+    let run = |text: &str, dialect: Dialect| -> Result<usize, String> {
+        let options = InterpreterOptions {
+            dialect: Some(dialect),
+            subprogram_folder: Some(folder.0.clone()),
+            ..InterpreterOptions::default()
+        };
+        let steps: Result<Vec<_>, _> =
+            Interpreter::new(std::io::Cursor::new(text), "part.nc", options).collect();
+        steps.map(|steps| steps.len()).map_err(|error| error.to_string())
+    };
+    assert_eq!(run("o<drill> call [5]\no<drill> call [7]\nG0 Y1\nM2\n", Dialect::LinuxCnc), Ok(6));
+    assert_eq!(run("O1\nM98 P20 L3\nG0 X1.\nM30\n", Dialect::Fanuc), Ok(5));
+    let error = run("G0 X1\no<faulty> call\nM2\n", Dialect::LinuxCnc).expect_err("a fault");
+    assert!(
+        error.starts_with("part.nc:2: line 2 of the file of a subprogram: word Q has no effect"),
+        "{error}"
+    );
+    let error = run("o<none> call\nM2\n", Dialect::LinuxCnc).expect_err("no file");
+    assert_eq!(
+        error,
+        "part.nc:1: Onone: no such subprogram in this file, and no file with its name beside it"
+    );
+}

@@ -1,0 +1,96 @@
+//! First section of the page: whether the result is valid, and how the model compares with a constant lag.
+
+use virtual_axes_identify::identify::summary::{BaselineSummary, IdentificationSummary, ResidualSummary};
+use virtual_axes_identify::recording::Severity;
+
+use super::figures;
+use super::page::{IdentificationPage, notice};
+use crate::text::{capital, digits};
+use crate::{Section, Table};
+
+/// Creates the section; `machine_file` is a sentence about the machine file.
+pub(super) fn section(page: &IdentificationPage, machine_file: Option<&str>) -> Section {
+    let summary = &page.found.summary;
+    let invalid: Vec<_> =
+        summary.findings.iter().filter(|finding| finding.severity == Severity::Invalid).collect();
+    let verdict = match invalid.len() {
+        0 => "The result is valid.".to_owned(),
+        1 => "The result is invalid and must not be used, for this reason:".to_owned(),
+        count => format!("The result is invalid and must not be used, for these {count} reasons:"),
+    };
+    let mut section = Section::new("Result");
+    section.paragraphs.push(format!("{verdict} {}.", capital(&figures::verdict(summary))));
+    section.notices = invalid.into_iter().map(notice).collect();
+    section.paragraphs.extend(machine_file.map(str::to_owned));
+    section.paragraphs.extend(comparisons(summary));
+    if summary.validation.is_empty() {
+        section.paragraphs.push(
+            "No recording was kept for validation (--validate): how the model predicts another program is not shown."
+                .to_owned(),
+        );
+    }
+    section.tables.extend(table(page));
+    section
+}
+
+/// Returns the residuals with a baseline, those of validation recordings first.
+fn baselines(found: &IdentificationSummary) -> Vec<(String, bool, &ResidualSummary, &BaselineSummary)> {
+    let unseen = found.validation.iter().map(|v| (v.recording.name.clone(), true, &v.residuals));
+    let own = found.agreement.iter().map(|a| (a.name.clone(), false, &a.residuals));
+    let with_baseline = |(name, is_unseen, residuals): (String, bool, _)| {
+        let residuals: &ResidualSummary = residuals;
+        Some((name, is_unseen, residuals, residuals.baseline.as_ref()?))
+    };
+    unseen.chain(own).filter_map(with_baseline).collect()
+}
+
+/// Returns a sentence for each recording: the model against the constant lag.
+fn comparisons(found: &IdentificationSummary) -> Vec<String> {
+    let unit = crate::DisplayUnit::error(found.kind).symbol;
+    let sentence = |(name, is_unseen, _, baseline): (String, bool, _, &BaselineSummary)| {
+        let use_of =
+            if is_unseen { "not used for the identification" } else { "used for the identification" };
+        let [model, delayed] = [baseline.model, baseline.delayed].map(|rms| digits(rms, 3));
+        let ratio = baseline.delayed / baseline.model;
+        let than = match ratio {
+            ratio if ratio >= 1.05 => format!("{} times as much", digits(ratio, 3)),
+            ratio if ratio > 0.95 => "as much".to_owned(),
+            _ => "less".to_owned(),
+        };
+        format!(
+            "{name} ({use_of}): the position deviates from the model by {model} {unit} RMS, and from PSEC with the best constant \
+             lag ({:.2} ms) by {delayed} {unit} RMS, {than}.",
+            baseline.lag_ms
+        )
+    };
+    baselines(found).into_iter().map(sentence).collect()
+}
+
+/// Lists the residuals of each recording; none without simulation.
+fn table(page: &IdentificationPage) -> Option<Table> {
+    let found = &page.found.summary;
+    let unit = page.error_unit().symbol;
+    let columns = [
+        ("recording", ""),
+        ("use", ""),
+        ("model, RMS", unit),
+        ("constant lag, RMS", unit),
+        ("lag", "ms"),
+        ("PSEC, RMS", unit),
+        ("R² of the current", ""),
+    ];
+    let row = |(name, is_unseen, residuals, baseline): (String, bool, &ResidualSummary, &BaselineSummary)| {
+        let r_squared = residuals.inverse_dynamics.as_ref().map(|inverse| inverse.current_r_squared);
+        vec![
+            name,
+            if is_unseen { "validation" } else { "identification" }.to_owned(),
+            digits(baseline.model, 3),
+            digits(baseline.delayed, 3),
+            format!("{:.2}", baseline.lag_ms),
+            digits(baseline.command, 3),
+            r_squared.map_or(crate::text::NONE.to_owned(), |r2| format!("{r2:.4}")),
+        ]
+    };
+    let rows: Vec<Vec<String>> = baselines(found).into_iter().map(row).collect();
+    (!rows.is_empty()).then(|| Table { rows, ..Table::new("Model against constant lag", &columns) })
+}

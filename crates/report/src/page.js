@@ -1,0 +1,420 @@
+// Plots the figures of the page with Plotly: the path of the tool in space, and charts whose zoom, runs and cursor are linked.
+"use strict";
+(() => {
+  const DASHES = ["solid", "9px,4px", "3px,3px", "10px,3px,2px,3px", "16px,5px", "6px,2px,2px,2px"];
+  const MARKERS = ["circle", "square", "x", "cross"];
+  const MANY = 300;
+  const PANEL = 150, PANEL_ALONE = 300, GAP = 18, PRINTED_WIDTH = 690;
+  const VIEWS = {
+    "3D": { x: 1.1, y: -1.5, z: 1.1 },
+    Top: { x: 0, y: -0.001, z: 2.2 },
+    Front: { x: 0, y: -2.2, z: 0 },
+    Side: { x: 2.2, y: 0, z: 0 },
+  };
+  const CONFIG = { responsive: true, displaylogo: false, displayModeBar: innerWidth > 760 ? "hover" : false, modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"] };
+
+  const figures = [...document.querySelectorAll("figure")].map(element => {
+    const data = JSON.parse(element.querySelector("script").textContent);
+    return { element, data, plot: element.querySelector(".plot"), isDrawn: false };
+  });
+  const space = figures.find(figure => figure.data.form === "path");
+  const overTime = figures.filter(figure => figure.data.form === "time");
+  const hidden = new Set();
+  const screen = { isPrinting: false, overPath: false, cursor: null };
+
+  const color = name => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  // Plotly takes texts as HTML.
+  const plain = text => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+  const digits = (value, unit) => value === null || value === undefined ? "–" : `${Number(value.toPrecision(4))} ${unit}`;
+  const range = values => values.reduce(([low, high], v) => v === null ? [low, high] : [Math.min(low, v), Math.max(high, v)],
+    [Infinity, -Infinity]);
+  const isInside = (value, low, high) => low === null || low === undefined || (value >= low && value <= high);
+  const isShown = run => run === null || run === undefined || !hidden.has(run);
+
+  function base(margin) {
+    const { width } = screen.isPrinting ? { width: PRINTED_WIDTH } : {};
+    return {
+      width, autosize: !width, margin, uirevision: "page", hovermode: "closest",
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: color("area"),
+      font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: color("muted") },
+      legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", font: { color: color("ink") } },
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: color("zero"), activecolor: color("ink") },
+      hoverlabel: { bgcolor: color("page"), bordercolor: color("rule"), font: { color: color("ink") }, namelength: 40 },
+    };
+  }
+
+  // Charts
+
+  function pathPosition(run, time) {
+    const { time: times, path } = space.data.runs.find(one => one.run === run) ?? space.data.runs[0];
+    let [low, high] = [0, times.length - 1];
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (times[middle] <= time) low = middle; else high = middle;
+    }
+    const step = times[high] - times[low];
+    const part = step > 0 ? Math.min(Math.max((time - times[low]) / step, 0), 1) : 0;
+    return path[low] + part * (path[high] - path[low]);
+  }
+
+  function chart(data) {
+    const { panels, x } = data, isTime = data.form === "time";
+    const isOverPath = isTime && screen.overPath;
+    const at = (run, values) => isOverPath ? values.map(v => v === null ? null : pathPosition(run, v)) : values;
+    const plotted = panels.length > 1 ? panels.length * (PANEL + GAP) - GAP : PANEL_ALONE;
+    const layout = {
+      ...base({ l: 66, r: 14, t: 10, b: 46 }), height: plotted + 96, shapes: [], annotations: [],
+      hovermode: data.form === "plain" ? "closest" : "x unified", hoversubplots: "axis",
+      xaxis: axis(x, { anchor: panels.length > 1 ? `y${panels.length}` : "y", showspikes: true, spikemode: "across",
+        spikethickness: 1, spikecolor: color("zero"), spikedash: "solid", hoverformat: ".5~g" }),
+    };
+    if (isOverPath) Object.assign(layout.xaxis, { title: { text: "Path position (mm)" }, autorange: true, range: undefined });
+    const traces = [], names = new Set();
+    const legend = name => ({ name: plain(name), legendgroup: name, showlegend: name !== "" && !names.has(name) && !!names.add(name) });
+    panels.forEach((panel, i) => {
+      const id = i === 0 ? "" : String(i + 1);
+      const top = 1 - i * (PANEL + GAP) / plotted, bottom = panels.length > 1 ? top - PANEL / plotted : 0;
+      const values = range(panel.series.flatMap(series => series.y));
+      layout[`yaxis${id}`] = axis(panel.y, { domain: [Math.max(bottom, 0), top], hoverformat: ".4~g" }, values);
+      for (const series of panel.series) traces.push({ ...line(series, legend), x: at(series.run, series.x), yaxis: `y${id}` });
+      if (panel.series.every(series => series.y.every(v => v === null)))
+        layout.annotations.push({ text: "no values", showarrow: false, xref: "paper", yref: "paper", x: 0.5, y: (top + bottom) / 2 });
+      for (const band of panel.bands) for (const [y0, y1] of band.ends)
+        layout.shapes.push({ ...shade(band), xref: "paper", x0: 0, x1: 1, yref: `y${id}`, y0, y1 });
+      for (const { at, label } of panel.lines) layout.shapes.push({ ...guide(label), xref: "paper", x0: 0, x1: 1,
+        yref: `y${id}`, y0: at, y1: at, label: { text: plain(label), textposition: "end", yanchor: "bottom", font: { color: color("ink") } } });
+    });
+    if (panels.length > 0 && data.bands.length > 0) {
+      layout.yaxis99 = { domain: [0, 1], range: [0, 1], visible: false, fixedrange: true, overlaying: "y" };
+      for (const band of data.bands) {
+        const ends = band.ends.map(pair => at(null, pair));
+        traces.push({ ...legend(band.label), x: ends.flatMap(([a, b]) => [a, a, b, b, null]), y: ends.flatMap(() => [0, 1, 1, 0, null]),
+          yaxis: "y99", mode: "none", fill: "toself", fillcolor: color(band.class) + "30", hoverinfo: "skip" });
+      }
+    }
+    for (const { at, label } of data.lines)
+      layout.shapes.push({ ...guide(label), yref: "paper", y0: 0, y1: 1, x0: at, x1: at, label: { text: plain(label),
+        textposition: "end", textangle: 0, xanchor: "left", yanchor: "top", padding: 6, font: { color: color("ink") } } });
+    if (isTime && screen.cursor) {
+      const x = at(screen.cursor.run, [screen.cursor.time])[0];
+      layout.shapes.push({ type: "line", yref: "paper", y0: 0, y1: 1, x0: x, x1: x, line: { color: color("ink"), width: 1.5, dash: "dot" } });
+    }
+    return { traces, layout };
+  }
+
+  function axis(data, more, values) {
+    const result = { title: { text: plain(data.label), standoff: 8, font: { size: data.label.length > 22 && more.domain?.[0] > 0 ? 10 : 12 } }, gridcolor: color("grid"), zerolinecolor: color("zero"),
+      linecolor: color("rule"), showline: true, mirror: true, ticks: "outside", tickcolor: color("rule"), automargin: true,
+      exponentformat: data.log ? "none" : "power", type: data.log ? "log" : "linear", rangemode: data.zero ? "tozero" : "normal", ...more };
+    if (data.from !== null) result.range = [data.from, data.to].map(end => data.log ? Math.log10(end) : end);
+    else if (values && !data.log && values[1] - values[0] < data.least) {
+      const middle = (values[0] + values[1]) / 2 || 0;
+      result.range = [middle - data.least / 2, middle + data.least / 2];
+    }
+    return result;
+  }
+
+  function line(series, legend) {
+    const { kind, style, run, errors } = series, hue = kind === "commanded" ? color("setpoint") : color(`run-${style % 6 + 1}`);
+    const trace = { type: "scatter", ...legend(series.label), y: series.y, meta: run, visible: isShown(run) };
+    if (kind === "points") {
+      const few = series.y.length <= MANY;
+      const marker = { color: hue, symbol: MARKERS[style % 4], size: few ? 8 : 4, opacity: few ? 1 : 0.6 };
+      return { ...trace, mode: "markers", marker,
+        error_y: errors.length ? { type: "data", array: errors, color: hue, thickness: 1.2, width: 3 } : undefined };
+    }
+    return { ...trace, mode: "lines", line: { color: hue, width: kind === "commanded" ? 4 : 1.6, simplify: true,
+      dash: kind === "line" ? DASHES[style % 6] : "solid", shape: kind === "steps" ? "hv" : "linear" } };
+  }
+
+  const shade = band => ({ type: "rect", layer: "below", line: { width: 0 }, fillcolor: color(band.class) + "30" });
+  const guide = () => ({ type: "line", line: { color: color("ink"), width: 1.2, dash: "7px,3px,2px,3px" } });
+
+  // Circles: the deviation is magnified about the nominal radius.
+
+  function circle(data) {
+    const [panel] = data.panels, unit = panel.y.unit;
+    const shown = panel.series.filter(series => isShown(series.run));
+    const [low, high] = range([0, ...shown.flatMap(series => series.y)]);
+    const step = roundStep((high - low || 1) / 4), first = Math.floor(low / step) * step, last = Math.ceil(high / step) * step;
+    const radius = value => 0.3 + 0.7 * (value - first) / (last - first || 1);
+    const point = (value, angle) => [radius(value) * Math.cos(angle), radius(value) * Math.sin(angle)];
+    const layout = { ...base({ l: 20, r: 20, t: 10, b: 20 }), height: 480, plot_bgcolor: "rgba(0,0,0,0)", shapes: [],
+      annotations: [], xaxis: { visible: false, range: [-1.18, 1.18] }, yaxis: { visible: false, range: [-1.18, 1.18], scaleanchor: "x" } };
+    for (let k = 0; first + k * step <= last + step / 2; k++) {
+      const value = first + k * step, r = radius(value), isNominal = Math.abs(value) < step / 2, [x, y] = point(value, 1.18);
+      layout.shapes.push({ type: "circle", layer: "below", x0: -r, x1: r, y0: -r, y1: r,
+        line: isNominal ? { color: color("ink"), width: 2 } : { color: color("rule"), width: 1 } });
+      layout.annotations.push({ x, y, text: `${Number(value.toPrecision(6))} ${unit}`.replace("-", "−"), showarrow: false, bgcolor: color("page"), borderpad: 1 });
+    }
+    const [a, b] = data.axes.map(plain);
+    [[`+${a}`, 1.1, 0], [`+${b}`, 0, 1.1], [`−${a}`, -1.1, 0], [`−${b}`, 0, -1.1]].forEach(([text, x, y]) =>
+      layout.annotations.push({ text, x, y, showarrow: false, font: { color: color("ink"), size: 14 } }));
+    const names = new Set();
+    const legend = name => ({ name: plain(name), showlegend: !names.has(name) && !!names.add(name) });
+    const traces = panel.series.map((series, i) => {
+      const points = series.y.map((value, k) => value === null || series.x[k] === null ? [null, null] : point(value, series.x[k] * Math.PI / 180));
+      const second = panel.series.findIndex(other => other.run === series.run) !== i;
+      const trace = line(series, legend);
+      if (second) trace.line.dash = "5px,3px";
+      return { ...trace, x: points.map(p => p[0]), y: points.map(p => p[1]),
+        text: series.y.map((value, k) => `${digits(value, unit)} at ${digits((series.x[k] ?? 0) % 360, "°")}`), hoverinfo: "text+name" };
+    });
+    return { traces, layout };
+  }
+
+  function roundStep(value) {
+    const power = 10 ** Math.floor(Math.log10(value));
+    return power * [1, 2, 5, 10].find(factor => factor * power >= value * 0.999);
+  }
+
+  // Path in space
+
+  const shownPoint = (one, i) => [0, 1, 2].map(axis => {
+    const [r, d] = [one.reference[axis][i], one.deviation[axis][i]];
+    return r === null || d === null ? null : r + space.magnification * d;
+  });
+
+  function hoverText(one, i) {
+    const number = one.lines[i], text = number ? `line ${number}: ${plain(one.texts[number] ?? "")}<br>` : "";
+    const feed = one.feed.length ? `<br>feed ${digits(one.feed[i], "m/min")}${one.rapid[i] ? ", rapid traverse" : ""}` : "";
+    const title = space.data.runs.length > 1 ? `${plain(one.title)}<br>` : "";
+    return `${title}${text}${digits(one.time[i], "s")}, contour error ${digits(one.error[i], "µm")}${feed}`;
+  }
+
+  // Returns the points of the segments of a kind, separated by gaps.
+  function segments(one, isOfKind, point) {
+    const found = { x: [], y: [], z: [], text: [], color: [], index: [] };
+    const add = (position, i) => {
+      ["x", "y", "z"].forEach((name, axis) => found[name].push(position[axis]));
+      found.text.push(i === null ? "" : hoverText(one, i));
+      found.color.push(i === null ? 0 : Math.log10(Math.max(one.error[i] ?? 0, 1e-6)));
+      found.index.push(i);
+    };
+    for (let i = 1; i < one.time.length; i++) {
+      if (!isOfKind(i)) continue;
+      if (found.index.at(-1) !== i - 1) { add([null, null, null], null); add(point(i - 1), i - 1); }
+      add(point(i), i);
+    }
+    return found;
+  }
+
+  const isRapid = one => i => one.rapid.length > 0 && one.rapid[i] === 1;
+  const isCut = one => i => !isRapid(one)(i);
+
+  // Returns the ranges of the feed motions, or of all if there are none.
+  function bounds() {
+    const all = [];
+    for (const kind of space.isWhole ? [() => () => true] : [isCut, () => () => true]) {
+      for (const one of space.data.runs.filter(one => isShown(one.run))) {
+        for (let i = 1; i < one.time.length; i++) if (kind(one)(i)) all.push(shownPoint(one, i), [0, 1, 2].map(a => one.reference[a][i]));
+      }
+      if (all.length) break;
+    }
+    const ranges = [0, 1, 2].map(a => range(all.map(point => point[a]))).map(([low, high]) => low <= high ? [low, high] : [-1, 1]);
+    const longest = Math.max(...ranges.map(([low, high]) => high - low), 1e-3);
+    return ranges.map(([low, high]) => {
+      const room = Math.max(0.04 * longest, (0.16 * longest - (high - low)) / 2);
+      return [low - room, high + room];
+    });
+  }
+
+  function colorScale() {
+    const errors = space.data.runs.flatMap(one => one.error.filter((e, i) => e > 0 && isCut(one)(i)));
+    const [least, most] = range(errors.length ? errors : [0.1, 1]);
+    const high = Math.log10(most), low = Math.max(Math.log10(least), high - 3, -3) - 1e-3;
+    const ticks = [];
+    for (let power = Math.floor(low); power <= high; power++)
+      for (const factor of high - low > 2 ? [1] : [1, 2, 5]) ticks.push(Number((factor * 10 ** power).toPrecision(3)));
+    const bar = space.plot.clientWidth < 500 ? { orientation: "h", y: -0.05, len: 0.9 } : { x: 1, len: 0.7 };
+    return { cmin: Math.min(low, high - 0.3), cmax: high, colorscale: [[0, color("low")], [0.5, color("middle")], [1, color("high")]],
+      colorbar: { title: { text: "error (µm)" }, tickvals: ticks.map(Math.log10), ticktext: ticks.map(String), thickness: 12,
+        outlinewidth: 0, ...bar } };
+  }
+
+  function path(data) {
+    const scale = colorScale(), ranges = bounds(), spans = ranges.map(([low, high]) => high - low);
+    const longest = Math.max(...spans), traces = [];
+    for (const one of data.runs) {
+      const visible = isShown(one.run), plotted = { type: "scatter3d", mode: "lines", meta: one.run, visible, hoverinfo: "text", showlegend: false };
+      const point = i => shownPoint(one, i), onPath = i => [0, 1, 2].map(axis => one.reference[axis][i]);
+      if (space.magnification > 1) traces.push({ ...plotted, ...segments(one, isCut(one), onPath), line: { color: color("zero"), width: 2 } });
+      if (one.rapid.includes(1)) traces.push({ ...plotted, ...segments(one, isRapid(one), point), line: { color: color("muted"), width: 2, dash: "dash" } });
+      const cuts = segments(one, isCut(one), point);
+      traces.push({ ...plotted, ...cuts, line: { ...scale, color: cuts.color, width: 5, showscale: one === data.runs[0] } });
+      const start = point(0);
+      traces.push({ ...plotted, mode: "markers", x: [start[0]], y: [start[1]], z: [start[2]], text: ["start"],
+        marker: { size: 5, symbol: "circle-open", color: color("ink") } });
+    }
+    const annotations = [];
+    if (screen.cursor) {
+      const { run, index } = screen.cursor, one = data.runs.find(one => one.run === run), [x, y, z] = shownPoint(one, index);
+      traces.push({ type: "scatter3d", mode: "markers", x: [x], y: [y], z: [z], text: [hoverText(one, index)], hoverinfo: "text",
+        showlegend: false, marker: { size: 8, color: color("ink"), symbol: "diamond-open" } });
+      annotations.push({ x, y, z, text: one.lines[index] ? `line ${one.lines[index]}` : digits(one.time[index], "s"), ax: 30, ay: -40,
+        arrowcolor: color("ink"), font: { color: color("ink"), size: 13 }, bgcolor: color("page"), bordercolor: color("rule") });
+    }
+    const sceneAxis = (name, i) => ({ title: { text: `${name} (mm)` }, range: ranges[i], gridcolor: color("rule"), zeroline: false, showspikes: false,
+      showbackground: false, color: color("muted"), tickfont: { size: 11 }, nticks: spans[i] < longest / 4 ? 3 : 6 });
+    const ratio = spans.map(span => 1.75 * Math.min(1.1, space.plot.clientWidth / 600) * span / longest);
+    const layout = { ...base({ l: 0, r: 0, t: 0, b: 0 }), height: space.plot.clientWidth < 500 ? 360 : 430, scene: {
+      xaxis: sceneAxis("X", 0), yaxis: sceneAxis("Y", 1), zaxis: sceneAxis("Z", 2), aspectmode: "manual",
+      aspectratio: { x: ratio[0], y: ratio[1], z: ratio[2] }, annotations, dragmode: "turntable",
+      camera: { eye: VIEWS[space.view], up: { x: 0, y: 0, z: 1 }, center: { x: 0, y: 0, z: 0 }, projection: { type: "orthographic" } },
+      uirevision: space.view + space.isWhole } };
+    return { traces, layout };
+  }
+
+  // Without WebGL: the two longest coordinates in the plane.
+  function flat(data) {
+    const { layout, traces } = path(data), ranges = bounds(), names = ["x", "y", "z"];
+    const [a, b] = [0, 1, 2].sort((i, j) => (ranges[j][1] - ranges[j][0]) - (ranges[i][1] - ranges[i][0])).slice(0, 2).sort();
+    const title = i => ({ label: `${names[i].toUpperCase()} (mm)`, from: ranges[i][0], to: ranges[i][1] });
+    return {
+      layout: { ...layout, scene: undefined, ...{ margin: { l: 60, r: 10, t: 10, b: 46 } }, xaxis: axis(title(a), {}),
+        yaxis: axis(title(b), { scaleanchor: "x" }) },
+      traces: traces.map(trace => ({ ...trace, type: "scatter", z: undefined, x: trace[names[a]], y: trace[names[b]],
+        mode: trace.line?.colorscale || trace.mode === "markers" ? "markers" : "lines",
+        marker: trace.line?.colorscale ? { ...trace.line, width: undefined, size: 4 } : { color: color("ink"), symbol: "circle-open" },
+        line: { color: color("zero"), dash: trace.line?.dash, width: 1.5 } })),
+    };
+  }
+
+  // Drawing
+
+  const hasSpace = !!document.createElement("canvas").getContext("webgl");
+  const FORMS = { plain: chart, time: chart, circle, path: hasSpace ? path : flat };
+
+  function draw(figure) {
+    const { traces, layout } = FORMS[figure.data.form](figure.data);
+    Plotly.react(figure.plot, traces, layout, CONFIG);
+    if (figure.isDrawn) return;
+    figure.isDrawn = true;
+    describe(figure);
+    if (figure.data.form === "time") {
+      figure.plot.on("plotly_relayout", change => linkZoom(figure, change));
+      figure.plot.on("plotly_click", ({ points: [point] }) => space && !screen.overPath && show(point.data.meta ?? 0, point.x));
+    }
+    if (figure === space) figure.plot.on("plotly_click", ({ points: [point] }) => {
+      const index = point.data.index?.[point.pointNumber];
+      if (index !== undefined && index !== null) showIndex(point.data.meta, index);
+    });
+  }
+
+  const redraw = list => list.filter(figure => figure.isDrawn).forEach(draw);
+
+  // The last zoom that all charts have, which their events repeat.
+  let lastZoom = "";
+  function linkZoom(from, change) {
+    if (!Object.keys(change).some(key => key.startsWith("xaxis."))) return;
+    const update = change["xaxis.autorange"] ? { "xaxis.autorange": true } : { "xaxis.range": [...from.plot.layout.xaxis.range] };
+    const zoom = JSON.stringify(update);
+    if (zoom === lastZoom) return;
+    lastZoom = zoom;
+    for (const figure of overTime) if (figure !== from && figure.isDrawn) Plotly.relayout(figure.plot, update);
+  }
+
+  // Shows the place of a run at a time.
+  function show(run, time) {
+    const one = space?.data.runs.find(one => one.run === run);
+    if (!one) return;
+    let nearest = 0;
+    one.time.forEach((t, i) => { if (Math.abs(t - time) < Math.abs(one.time[nearest] - time)) nearest = i; });
+    showIndex(run, nearest);
+  }
+
+  function showIndex(run, index) {
+    const one = space.data.runs.find(one => one.run === run);
+    screen.cursor = { run, index, time: one.time[index] };
+    redraw([space, ...overTime]);
+    space.note.textContent = hoverText(one, index).replace(/<br>/g, ", ").replace(/&lt;/g, "<").replace(/&gt;/g, ">").replace(/&amp;/g, "&");
+  }
+
+  // Text alternatives: the ranges of the values
+
+  function describe({ data, element, plot }) {
+    const text = (values, unit) => values.some(v => v !== null) ? `from ${range(values).map(v => digits(v, unit)).join(" to ")}` : "no values";
+    const marks = ({ lines, bands }) => [...lines.map(one => one.label), ...bands.map(one => `${one.label} ${one.ends.length} ×`)];
+    const parts = data.form === "path"
+      ? data.runs.map(one => ["X", "Y", "Z"].map((name, i) => `${name} ${text(one.reference[i], "mm")}`)
+        .concat(`contour error ${text(one.error, "µm")}`).join(", "))
+      : [...data.panels.map(({ y, series, ...marked }) =>
+        [y.label, ...series.map(one => `${one.label} ${text(one.y, y.unit)}`), ...marks(marked)].join(", ")), ...marks(data)];
+    plot.setAttribute("aria-label", [element.querySelector(".title").textContent, ...parts].join("; "));
+    const outside = (data.panels ?? []).flatMap(({ y, series }) => series.flatMap(one => one.y.filter((v, i) =>
+      v !== null && isInside(one.x[i], data.x.from, data.x.to) && !isInside(v, y.from, y.to)))).length;
+    if (outside > 0) element.querySelector(".note").append(` ${outside} of the values lie outside the plot; a double click shows them.`);
+  }
+
+  // Controls
+
+  function button(label, action, isPressed) {
+    const element = Object.assign(document.createElement("button"), { type: "button", textContent: label });
+    element.setAttribute("aria-pressed", String(isPressed));
+    element.addEventListener("click", () => {
+      for (const other of element.parentElement.querySelectorAll("button")) other.setAttribute("aria-pressed", String(other === element));
+      action();
+    });
+    return element;
+  }
+
+  function toolbar(label, buttons) {
+    const bar = Object.assign(document.createElement("div"), { className: "controls" });
+    bar.setAttribute("role", "group");
+    bar.setAttribute("aria-label", label);
+    bar.append(...buttons);
+    return bar;
+  }
+
+  function controls() {
+    if (space) {
+      const { runs, magnification } = space.data, isProgram = runs.some(one => one.lines.length);
+      Object.assign(space, { view: "3D", isWhole: false, magnification: isProgram ? 1 : magnification });
+      const bars = [toolbar("View", Object.keys(VIEWS).map(name => button(name, () => { space.view = name; draw(space); }, name === "3D")))];
+      if (magnification > 1) bars.push(toolbar("Scale of the error", [1, magnification].map(factor => button(factor > 1 ? `error × ${factor}` : "true scale",
+        () => { space.magnification = factor; draw(space); }, factor === space.magnification))));
+      if (runs.some(one => one.rapid.includes(1))) bars.push(toolbar("Extent", [["cuts", false], ["all", true]].map(([name, isWhole]) =>
+        button(name, () => { space.isWhole = isWhole; draw(space); }, !isWhole))));
+      space.note = Object.assign(document.createElement("p"), { className: "place", textContent: "" });
+      space.note.setAttribute("aria-live", "polite");
+      space.plot.before(...bars);
+      space.plot.after(space.note);
+      if (overTime.length) overTime[0].element.before(toolbar("Horizontal axis", [["over time", false], ["over path", true]].map(([name, overPath]) =>
+        button(name, () => { screen.overPath = overPath; redraw(overTime.map(one => (one.plot.layout.xaxis.autorange = true, one))); }, !overPath))));
+    }
+    const runs = document.querySelector("fieldset.runs");
+    if (runs && figures.length) {
+      runs.hidden = false;
+      runs.addEventListener("change", ({ target }) => {
+        if (target.checked) hidden.delete(Number(target.value)); else hidden.add(Number(target.value));
+        redraw(figures);
+      });
+    }
+    for (const place of document.querySelectorAll("button[data-time]")) place.addEventListener("click", () => {
+      document.querySelectorAll("button[data-time]").forEach(other => other.setAttribute("aria-pressed", String(other === place)));
+      show(Number(place.dataset.run), Number(place.dataset.time));
+    });
+  }
+
+  // The style sheet has other colors in a dark scheme and on paper.
+  function setPrinting(isPrinting) {
+    if (screen.isPrinting === isPrinting) return;
+    screen.isPrinting = isPrinting;
+    document.documentElement.classList.toggle("printing", isPrinting);
+    figures.forEach(draw);
+  }
+
+  controls();
+  const waiting = [...figures];
+  const next = () => {
+    const figure = waiting.shift();
+    if (!figure) { document.documentElement.dataset.plotted = "all"; return; }
+    if (!figure.isDrawn) draw(figure);
+    setTimeout(next);
+  };
+  next();
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraw(figures));
+  matchMedia("print").addEventListener("change", ({ matches }) => setPrinting(matches));
+  addEventListener("beforeprint", () => setPrinting(true));
+  addEventListener("afterprint", () => setPrinting(false));
+})();

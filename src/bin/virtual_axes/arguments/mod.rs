@@ -1,0 +1,6 @@
+//! Arguments that several commands share.
+
+pub mod axis;
+pub mod output_arguments;
+pub mod trial_arguments;
+pub mod variant;

@@ -1,0 +1,107 @@
+//! `/clock`: followed with `use_sim_time`, and watched for a second publisher in `fast`.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+use futures::StreamExt;
+use ros2_interfaces_jazzy_serde::builtin_interfaces::msg::Time;
+use ros2_interfaces_jazzy_serde::rosgraph_msgs::msg::Clock;
+use tokio::sync::watch;
+use tracing::{error, warn};
+
+use crate::ros::axes::{ClockFollower, ClockState};
+use crate::ros::topics::TopicInput;
+use virtual_axes_core::units::{Nanoseconds, SECOND_NS};
+use virtual_axes_dds::{Gid, Node, TopicEndpointInfo};
+
+/// Polling period of the publishers of the clock; in a large graph a poll takes long.
+const POLL_PERIOD: Duration = Duration::from_millis(200);
+/// Type of a topic that every node of this package publishes, and no other node.
+const MACHINE_TYPE: &str = "virtual_axes::msg::dds_::DriveStates_";
+
+/// GUID prefix of a participant.
+type GuidPrefix = [u8; 12];
+
+fn prefix_of(guid: &Gid) -> GuidPrefix {
+    std::array::from_fn(|i| guid[i])
+}
+
+/// Logs each publisher of the topic `name` beside that of `node`, which is in `fast`, and sets `count` to their number,
+/// until the task is aborted.
+pub async fn watch_other_clocks(node: Node, name: String, count: Arc<AtomicUsize>) {
+    let mut known = HashSet::new();
+    let mut timer = tokio::time::interval(POLL_PERIOD);
+    loop {
+        timer.tick().await;
+        let of_clock = |info: &TopicEndpointInfo| info.topic_name.as_ref() == Some(&name);
+        let found: Vec<_> = node.get_publishers_info().into_iter().filter(of_clock).collect();
+        for other in found.iter().filter(|other| !known.contains(&other.endpoint_gid)) {
+            let publisher = other.node_name.as_ref();
+            error!(
+                "{name}: {} publishes it, too; in time:=fast this node must be its only publisher: start one of them with \
+                 use_sim_time:=true, or end the other publisher",
+                publisher.map_or("another participant".to_owned(), |name| format!("node {name}"))
+            );
+        }
+        count.store(found.len(), Ordering::Relaxed);
+        known = found.into_iter().map(|other| other.endpoint_gid).collect::<HashSet<Gid>>();
+    }
+}
+
+/// Input of the clock with `use_sim_time`.
+pub struct ClockInput {
+    /// Subscription `/clock`.
+    pub subscription: TopicInput<Clock>,
+    /// Node that discovers the publishers.
+    pub node: Node,
+    /// Position cycle Tsp, ns.
+    pub period: Nanoseconds,
+    /// Sender of the state of the clock.
+    pub state: watch::Sender<ClockState>,
+}
+
+impl ClockInput {
+    /// Follows the clock until the task is aborted.
+    pub async fn run(self) {
+        let ClockInput { subscription, node, period, state } = self;
+        let name = &subscription.name;
+        let mut follower = ClockFollower::new(period);
+        // Nodes of this package, whose clock never jumps ahead.
+        let mut machines = HashSet::new();
+        let mut has_warned = false;
+        let mut timer = tokio::time::interval(POLL_PERIOD);
+        let mut messages = std::pin::pin!(subscription.messages());
+        loop {
+            tokio::select! {
+                _ = timer.tick() => {
+                    let publishers = node.get_publishers_info().into_iter();
+                    let of_machines = publishers.filter(|info| info.topic_type == MACHINE_TYPE);
+                    machines = of_machines.map(|info| prefix_of(&info.endpoint_gid)).collect();
+                }
+                Some(received) = messages.next() => match received {
+                    Ok((message, info)) => match valid_time(&message.clock) {
+                        Some(time) => {
+                            follower.receive(time, machines.contains(&prefix_of(&info.publisher_gid)));
+                            let received = follower.state();
+                            state.send_if_modified(|sent| std::mem::replace(sent, received) != received);
+                        }
+                        None if !std::mem::replace(&mut has_warned, true) => warn!(
+                            "{name}: invalid time: sec {}, nanosec {}; ignored, use sec >= 0 and nanosec < 1000000000",
+                            message.clock.sec, message.clock.nanosec
+                        ),
+                        None => {}
+                    },
+                    Err(error) => warn!("{name}: invalid message: {error}"),
+                },
+            }
+        }
+    }
+}
+
+/// Returns a time in ns; `None` before the epoch or with a whole second of nanoseconds.
+fn valid_time(time: &Time) -> Option<Nanoseconds> {
+    let nanosec = Nanoseconds::from(time.nanosec);
+    (time.sec >= 0 && nanosec < SECOND_NS).then_some(Nanoseconds::from(time.sec) * SECOND_NS + nanosec)
+}
