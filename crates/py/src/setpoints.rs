@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::ffi::CString;
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use virtual_axes_builtin::{PROGRAMS, SCENARIOS};
@@ -13,6 +13,7 @@ use virtual_axes_core::scenario::Scenario as CoreScenario;
 use virtual_axes_core::simulation::joint_limits;
 use virtual_axes_core::text::{builtin_names, builtin_text};
 use virtual_axes_core::trial::{GridRows, GridSource, ProgramSource};
+use virtual_axes_io::files::PsecCsvReader;
 use virtual_axes_nc::interpret::IgnoredCodes;
 use virtual_axes_nc::offline::{OverrideSchedule, PartProgramOptions, PartProgramSource, ProgramTrack};
 use virtual_axes_nc::plan::PlanOptions;
@@ -65,6 +66,56 @@ impl Rows {
         let rows = self.values.len() / columns.max(1);
         PyArray1::from_vec(py, self.values).reshape([rows, columns])
     }
+}
+
+/// Returns a table as CSV; each number parses to the same bits.
+pub fn csv(names: &[String], columns: &[PyReadonlyArray1<'_, f64>]) -> PyResult<String> {
+    let columns: Vec<Vec<f64>> = columns.iter().map(|column| column.as_array().to_vec()).collect();
+    let rows = columns.first().map_or(0, Vec::len);
+    if columns.len() != names.len() || columns.iter().any(|column| column.len() != rows) {
+        return Err(value_error("the columns have different lengths"));
+    }
+    if let Some(name) = names.iter().find(|name| name.contains([',', ';', '\t', '\n', '\r', '"'])) {
+        return Err(value_error(format!(
+            "column {name:?}: a name must not have separators or quotation marks"
+        )));
+    }
+    let mut text = names.join(",");
+    for row in 0..rows {
+        let values: Vec<String> = columns.iter().map(|column| cell(column[row])).collect();
+        text.push('\n');
+        text.push_str(&values.join(","));
+    }
+    text.push('\n');
+    Ok(text)
+}
+
+/// Returns a number as text; one that is missing is empty.
+fn cell(value: f64) -> String {
+    if value.is_nan() { String::new() } else { value.to_string() }
+}
+
+/// Returns the setpoints of a table with times at the position cycles, as `virtual_axes run` reads them from CSV.
+pub fn over_time<'py>(
+    py: Python<'py>,
+    machine: &PyMachine,
+    names: &[String],
+    columns: &[PyReadonlyArray1<'py, f64>],
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let text = csv(names, columns)?;
+    let rows = py.detach(|| {
+        let (limits, period) = (joint_limits(&machine.config, ""), machine.config.periods().position);
+        let mut reader = PsecCsvReader::new(text.as_bytes(), "psec", period, &limits).map_err(value_error)?;
+        let (joints, axes) = (reader.joints().to_vec(), machine.config.axes().len());
+        let (mut row, mut values) = (vec![0.0; joints.len()], Vec::new());
+        while reader.next(&mut row).map_err(value_error)? {
+            let begin = values.len();
+            values.resize(begin + axes, 0.0);
+            joints.iter().zip(&row).for_each(|(&joint, &value)| values[begin + joint] = value);
+        }
+        Ok::<_, PyErr>(Rows { joints: (0..axes).collect(), values, rapid: Vec::new() })
+    })?;
+    rows.into_array(py)
 }
 
 /// Test motion of a scenario file, planned within the limits of a machine.

@@ -14,15 +14,18 @@ The ROS messages of the node are in the module `virtual_axes`, which ROS generat
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 
 from . import design
-from ._native import PartProgram, Scenario, machine_names, nc_program_names, scenario_names
+from ._native import PartProgram, Rst, Scenario, __version__, machine_names, nc_program_names, scenario_names
+from .arguments import to_path
 from .chunks import SweepResult
+from .design import plot_bode
 from .identification import Identification, identify
-from .machine import SIGNALS, Machine
+from .machine import SIGNALS, TOOL_SIGNALS, Machine
 from .optimization import Optimum, optimize
-from .run import Run
+from .run import Circle, Run
 from .shards import merge
 from .stepper import Stepper
 from .study import SweepResults, random_variants, sweep
@@ -30,16 +33,20 @@ from .tuning import TuningResult, tune
 
 __all__ = [
     "SIGNALS",
+    "TOOL_SIGNALS",
+    "Circle",
     "Identification",
     "Machine",
     "Optimum",
     "PartProgram",
+    "Rst",
     "Run",
     "Scenario",
     "Stepper",
     "SweepResult",
     "SweepResults",
     "TuningResult",
+    "__version__",
     "design",
     "identify",
     "machine_names",
@@ -47,6 +54,7 @@ __all__ = [
     "nc_program",
     "nc_program_names",
     "optimize",
+    "plot_bode",
     "random_variants",
     "scenario",
     "scenario_names",
@@ -55,17 +63,17 @@ __all__ = [
 ]
 
 
-def scenario(name_or_path: str, feed: float | None = None) -> Scenario:
+def scenario(name_or_path: str | os.PathLike[str], feed: float | None = None) -> Scenario:
     """Loads a built-in scenario (`scenario_names()`) or a scenario file.
 
     `feed` replaces the feed of the scenario, m/min (rpm for a scenario of rotary moves). Raises `ValueError` with file,
     line, key and value for an invalid scenario.
     """
-    return Scenario.load(name_or_path, feed)
+    return Scenario.load(to_path("name_or_path", name_or_path), feed)
 
 
 def nc_program(
-    name_or_path: str,
+    name_or_path: str | os.PathLike[str],
     feed_override: float = 1.0,
     *,
     ignore: Iterable[int | str] = (),
@@ -88,4 +96,4 @@ def nc_program(
         "chord_error": chord_error,
         "centripetal_acceleration": centripetal_acceleration,
     }
-    return PartProgram.load(name_or_path, arguments)
+    return PartProgram.load(to_path("name_or_path", name_or_path), arguments)
