@@ -103,6 +103,13 @@ impl MachineModel {
         limits
     }
 
+    /// Returns the largest acceleration and jerk along the path near the start of a piece, whose `node` is singular where a
+    /// blend of opposite motions turns back.
+    fn tangential_near_start(&self, piece: &Piece, node: &Node) -> [f64; 2] {
+        let limits = self.tangential(node);
+        if limits[1].is_finite() { limits } else { self.tangential(&self.node(piece, 0.5 * piece.length).0) }
+    }
+
     /// Returns the places near `piece` where the feed changes by more than a little, with the length of the intervals
     /// there, which last `time` at the lower feed. `node` is that of the start of the piece.
     fn feed_changes(&self, piece: &Piece, node: &Node, time: f64) -> Vec<(f64, f64)> {
@@ -139,7 +146,7 @@ impl MachineModel {
     /// Divides a piece into intervals. `push` receives the start of each, from the start of the piece, and the interval.
     pub fn divide(&self, piece: &Piece, around: &Surroundings, mut push: impl FnMut(f64, Interval)) {
         let (node, cap) = self.node(piece, 0.0);
-        let [acceleration, jerk] = self.tangential(&node);
+        let [acceleration, jerk] = self.tangential_near_start(piece, &node);
         let from_stop = around.from_stop;
         let phase = (acceleration / jerk).min((cap / jerk).sqrt());
         let most = 0.05 * piece.length;

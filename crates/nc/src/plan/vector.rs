@@ -13,7 +13,8 @@ pub(super) type Jet = [JointVector; 4];
 
 /// Returns the Euclidean norm of the values at `indices`.
 pub(super) fn norm(vector: &JointVector, indices: &[usize]) -> f64 {
-    indices.iter().map(|&i| vector[i] * vector[i]).sum::<f64>().sqrt()
+    // Not `sum`, which is -0 without indices.
+    indices.iter().map(|&i| vector[i] * vector[i]).fold(0.0, |sum, square| sum + square).sqrt()
 }
 
 /// Length that counts for one radian of a rotary axis in the path parameter, m.
@@ -126,6 +127,12 @@ mod tests {
     use super::*;
     use virtual_axes_core::config::{MachineConfig, Parameters};
     use virtual_axes_core::kinematics::Kinematics;
+
+    #[test]
+    fn no_joints_turn_at_no_rate() {
+        let rate = norm(&[1.0; MAX_JOINTS], &[]);
+        assert!(rate == 0.0 && rate.is_sign_positive(), "{rate}");
+    }
 
     #[test]
     fn tip_transform_agrees_with_the_kinematics() {

@@ -6,6 +6,7 @@ mod feed_override;
 mod five_axis;
 mod global_optimum;
 mod limits;
+mod memory;
 mod optimum;
 mod profile;
 mod programs;
