@@ -42,6 +42,12 @@ impl State {
                 block.skip("XYZABC");
                 self.modal.frames[MIRROR] = CoordinateFrame::identity();
             }
+            Some(Scaling::MirrorByFlags) => {
+                // R rounds corners.
+                block.skip("R");
+                let factors = self.center(block)?.map(|flag| if flag.unwrap_or(0.0) == 0.0 { 1.0 } else { -1.0 });
+                self.modal.frames[MIRROR] = CoordinateFrame::scaling(Vector3::from(factors));
+            }
             Some(Scaling::Mirror | Scaling::Mirror101) => {
                 let center = self.center(block)?;
                 let factors = center.map(|center| if center.is_some() { -1.0 } else { 1.0 });
@@ -52,7 +58,13 @@ impl State {
         }
         match codes.g.rotation {
             None => {}
-            Some(Rotation::Off) => {
+            Some(Rotation::ShiftAndTurn) => {
+                let shift = Vector3::from(self.center(block)?.map(Option::unwrap_or_default));
+                let angle = block.take('P').unwrap_or(0.0).to_radians();
+                let turned = CoordinateFrame::rotation(self.modal.plane.axes()[2], angle);
+                self.modal.frames[ROTATION] = CoordinateFrame::shift(shift).then(&turned);
+            }
+            Some(Rotation::Off | Rotation::OffByG10) => {
                 self.modal.frames[ROTATION] = CoordinateFrame::identity();
                 self.tilt = None;
             }

@@ -26,6 +26,7 @@ mod macro_b;
 mod moves;
 mod o_words;
 mod offsets;
+mod okuma;
 mod options;
 mod parameters;
 mod pocket;

@@ -227,7 +227,18 @@ impl State {
     }
 
     /// Appends a rapid traverse to the steps.
-    pub(super) fn push_rapid(&mut self, end: Coordinates) -> Outcome<()> {
+    pub(super) fn push_rapid(&mut self, mut end: Coordinates) -> Outcome<()> {
+        if self.dialect == Dialect::Okuma && self.modal.tcp_length.is_none() {
+            for (axis, limit) in self.options.upper_limits.into_iter().enumerate().take(3) {
+                if end[axis] > limit {
+                    end[axis] = limit;
+                    self.assume(format!(
+                        "G0 beyond the upper travel limit of {}: the axis stops there, as on the control",
+                        AXIS_LETTERS[axis]
+                    ));
+                }
+            }
+        }
         self.push_motion(MotionKind::Rapid, end, Feed::Rapid)
     }
 

@@ -179,6 +179,11 @@ impl<R: BufRead + Seek> LineSource<R> {
                 line.drain(..3);
             }
             let text = line.trim_ascii();
+            // Head of a file of Okuma.
+            if !self.has_text && text.starts_with(b"$") && text.ends_with(b"%") {
+                self.has_text = true;
+                continue;
+            }
             // A percent sign encloses the program: before its first line with text, which may follow it, and after its
             // last. Heads %_N_ of Sinumerik are lines.
             if let Some(rest) = text.strip_prefix(b"%")
