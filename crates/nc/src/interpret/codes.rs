@@ -62,10 +62,8 @@ macro_rules! codes {
 
             /// Returns the dialects that have a code, as bits.
             fn dialects(number: u16) -> u8 {
-                match number {
-                    $($($number => $dialects,)+)+
-                    _ => 0,
-                }
+                let rows = [$($(($number, $dialects)),+),+];
+                rows.iter().filter(|(known, _)| *known == number).fold(0, |bits, (_, dialects)| bits | dialects)
             }
         }
     };
@@ -100,6 +98,11 @@ codes! {
         BackBoring = 870 in FHM | OKUMA, "G87: back boring from below";
         ManualBoring = 880 in FHM | OKUMA, "G88: boring with dwell, spindle stop and retraction";
         DwellBoring = 890 in CYCLES, "G89: boring with dwell and retraction at feed";
+        Skip = 310 in FHM | OKUMA, "G31: probing to the end of a straight line";
+        Probe382 = 382 in NGC, "G38.2: probing to the end of a straight line";
+        Probe383 = 383 in NGC, "G38.3: probing to the end of a straight line";
+        Probe384 = 384 in NGC, "G38.4: probing to the end of a straight line";
+        Probe385 = 385 in NGC, "G38.5: probing to the end of a straight line";
         LeftTapping174 = 1740 in HAAS, "G174: left-hand tapping";
         Tapping184 = 1840 in HAAS, "G184: tapping";
         LeftTapping274 = 2740 in OKUMA, "G274: left-hand tapping";
@@ -290,11 +293,6 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
 const REMEDIES: &[(u16, &str)] = &[
     (71, "cylindrical interpolation: program the motions of the axes"),
     (121, "polar coordinate interpolation: program the motions of the axes"),
-    (310, "probing needs a workpiece: skip it with --ignore G31"),
-    (382, "probing needs a workpiece: skip it with --ignore G38.2"),
-    (383, "probing needs a workpiece: skip it with --ignore G38.3"),
-    (384, "probing needs a workpiece: skip it with --ignore G38.4"),
-    (385, "probing needs a workpiece: skip it with --ignore G38.5"),
     (760, "threading on a lathe: no axis of the machine turns the workpiece"),
     (1120, "polar coordinate interpolation: program the motions of the axes"),
     (1410, "3D cutter compensation: program the offset path"),

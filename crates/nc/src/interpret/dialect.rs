@@ -1,13 +1,15 @@
 //! Dialects of G code, and their detection from the content of a program.
 
 use std::fmt;
-use std::io::{BufRead, Read, Seek, SeekFrom};
+use std::io::{BufRead, Seek, SeekFrom};
 use std::str::FromStr;
+
+use super::encoding::Encoding;
 
 /// Bytes at the start of a program in which its dialect is detected.
 const DETECTION_BYTES: usize = 1 << 20;
 /// Longest line in which evidence is searched, bytes.
-const LINE_BYTES: u64 = 4096;
+const LINE_BYTES: usize = 4096;
 /// Points from which a dialect is detected.
 const ENOUGH: u32 = 3;
 
@@ -99,9 +101,9 @@ impl DetectedDialect {
     pub fn of<R: BufRead + Seek>(source: &mut R) -> Self {
         let mut scores: [Score; Dialect::ALL.len()] = Default::default();
         let (mut bytes, mut line) = (0, Vec::new());
+        let encoding = Encoding::of(source.fill_buf().unwrap_or_default());
         for number in 1.. {
-            line.clear();
-            let read = source.by_ref().take(LINE_BYTES).read_until(b'\n', &mut line).unwrap_or(0);
+            let read = encoding.read_line(source, LINE_BYTES, &mut line).unwrap_or(0);
             bytes += read;
             if read == 0 || bytes > DETECTION_BYTES {
                 break;
@@ -122,20 +124,47 @@ impl DetectedDialect {
 }
 
 /// Returns true for a text of which at least half of the lines are words of G code, and one is at all.
+/// Programs of other controls, whose format an error names, are such a text too.
 pub fn is_g_code(head: &[u8]) -> bool {
+    let encoding = Encoding::of(head);
+    let (mut rest, mut line) = (head, Vec::new());
     let (mut words, mut others) = (0, 0);
-    for line in head.split(|byte| *byte == b'\n') {
-        let line = String::from_utf8_lossy(line).trim().to_ascii_uppercase();
+    while encoding.read_line(&mut rest, LINE_BYTES, &mut line).is_ok_and(|read| read > 0) {
+        let line = String::from_utf8_lossy(&line).trim().to_ascii_uppercase();
+        if foreign_format(&line).is_some() {
+            return true;
+        }
         let code = code_of(&line);
         if code.is_empty() || code.starts_with('%') {
             continue;
         }
-        let mut letters = code.trim_start_matches('/').chars();
-        let is_word = letters.next().is_some_and(|letter| "GMNXYZTFSO#:".contains(letter))
-            && letters.next().is_some_and(|next| next.is_ascii_digit() || "+-.<[=".contains(next));
-        *(if is_word { &mut words } else { &mut others }) += 1;
+        *(if is_word_line(&line) { &mut words } else { &mut others }) += 1;
     }
     words > 0 && words >= others
+}
+
+/// Returns true for a line in upper case that begins with a word of G code.
+pub(super) fn is_word_line(line: &str) -> bool {
+    let code = code_of(line);
+    let mut letters = code.trim_start_matches('/').chars();
+    letters.next().is_some_and(|letter| "GMNXYZTFSO#:".contains(letter))
+        && letters.next().is_some_and(|next| next.is_ascii_digit() || "+-.<[=".contains(next))
+}
+
+/// Returns the name of the format that a line in upper case shows, if it is no G code of a supported dialect.
+pub(super) fn foreign_format(line: &str) -> Option<&'static str> {
+    const APT: [&str; 8] =
+        ["PARTNO", "TOOL PATH/", "MULTAX/", "LOADTL/", "CUTTER/", "GOTO/", "MACHIN/", "TLDATA/"];
+    let text = line.trim_start_matches(|letter: char| letter.is_ascii_digit() || letter == ' ');
+    if text.starts_with("BEGIN PGM") {
+        return Some("a conversational program of Heidenhain (Klartext)");
+    }
+    if APT.iter().any(|word| text.starts_with(word)) {
+        return Some("a cutter location file (APT, CLS)");
+    }
+    let is_iso =
+        line.starts_with('%') && line.ends_with('*') && (line.contains(" G71") || line.contains(" G70"));
+    is_iso.then_some("a program of Heidenhain in DIN/ISO")
 }
 
 /// Evidence for one dialect.

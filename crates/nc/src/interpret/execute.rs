@@ -5,7 +5,8 @@ use virtual_axes_core::units::{DEGREE, MILLIMETER, RPM};
 
 use super::codes::{
     Action, ArcDistance, Codes, Coolant, Distance, FeedMode, Motion, PathControlCode, PlaneCode, Retraction,
-    SavedModes, Spindle, SpindleMode, SpindleWithCoolant, Stop, ToolChange, ToolLength, Units, WorkSystem, g_name,
+    SavedModes, Spindle, SpindleMode, SpindleWithCoolant, Stop, ToolChange, ToolLength, Units, WorkSystem,
+    g_name,
 };
 use super::contour::Corner;
 use super::dialect::Dialect;
@@ -350,13 +351,12 @@ impl State {
         let mut is_machine = self.modal.is_machine;
         match codes.g.action {
             None
-            | Some(
-                Action::Dwell | Action::MacroCall | Action::ToolChange111 | Action::ToolChange116,
-            ) => {}
+            | Some(Action::Dwell | Action::MacroCall | Action::ToolChange111 | Action::ToolChange116) => {}
             Some(Action::ReturnLevel) => {
                 let drill = self.modal.plane.axes()[2];
                 let level = block.take(AXIS_LETTERS[drill]).map(|level| level * self.modal.length);
-                self.modal.return_level.1 = Some(level.ok_or("G71 requires the level of retraction, as in G71 Z50")?);
+                self.modal.return_level.1 =
+                    Some(level.ok_or("G71 requires the level of retraction, as in G71 Z50")?);
             }
             Some(Action::MachineCoordinates) => is_machine = true,
             Some(Action::Data) => self.set_data(block)?,

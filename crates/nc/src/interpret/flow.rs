@@ -9,8 +9,8 @@ use super::error::Outcome;
 use super::expression::Scanner;
 use super::files::subprogram_file;
 use super::limits::{MAX_BLOCKS, MAX_CALLS, MAX_SUBPROGRAMS};
-use super::okuma::line_name;
 use super::o_words::{BlockKind, Call, Flow, Keyword, OpenBlock, Statement, is_o_word};
+use super::okuma::line_name;
 use super::parameters::{LOCALS, integer};
 use super::source::Place;
 use super::state::Jump;
@@ -85,6 +85,11 @@ impl<R: BufRead + Seek> Interpreter<R> {
             Some(Jump::Call { program, times }) => {
                 let (program, times) = self.repeated_program(program, times)?;
                 self.call(&program.to_string(), None, times)
+            }
+            Some(Jump::Macro { program, arguments, .. })
+                if is_probing(program) && self.subprogram(&program.to_string()).is_err() =>
+            {
+                self.state.probing_macro(program, &arguments)
             }
             Some(Jump::Macro { program, times, arguments }) => {
                 self.call(&program.to_string(), Some(*arguments), times)
@@ -178,7 +183,8 @@ impl<R: BufRead + Seek> Interpreter<R> {
             is_first &= line.text.is_empty() || is_o_word(&line.text);
         };
         self.source.jump(here)?;
-        let place = found.ok_or_else(|| format!("N{}: no such line in the program that runs", line_name(number)))?;
+        let place =
+            found.ok_or_else(|| format!("N{}: no such line in the program that runs", line_name(number)))?;
         if self.flow.numbered.len() < MAX_SUBPROGRAMS {
             self.flow.numbered.insert((section, number), place);
         }
@@ -481,6 +487,11 @@ impl<R: BufRead + Seek> Interpreter<R> {
         self.source.jump(here)?;
         Ok(found)
     }
+}
+
+/// Returns true for the numbers of the probing macros of Renishaw and Haas.
+fn is_probing(program: u32) -> bool {
+    matches!(program, 9800..=9899 | 9023 | 9995)
 }
 
 fn too_deep(label: &str) -> String {

@@ -3,12 +3,12 @@
 use std::io::{BufRead, Seek};
 
 use super::Interpreter;
+use super::dialect::Dialect;
 use super::error::Outcome;
 use super::expression::Scanner;
-use super::dialect::Dialect;
 use super::limits::MAX_SUBPROGRAMS;
 use super::o_words::is_o_word;
-use super::okuma::{self, Statement};
+use super::okuma::{self, NamedStatement};
 use super::parameters::integer;
 use super::source::Place;
 use super::state::Jump;
@@ -58,24 +58,24 @@ impl<R: BufRead + Seek> Interpreter<R> {
     }
 
     /// Executes a statement of Okuma.
-    fn execute_okuma(&mut self, statement: Statement) -> Outcome<()> {
+    fn execute_okuma(&mut self, statement: NamedStatement) -> Outcome<()> {
         match statement {
-            Statement::Call(program, from) => {
+            NamedStatement::Call(program, from) => {
                 let times = self.read_arguments(from)?;
                 if times > 0 {
                     self.call(&program, None, times)?;
                 }
             }
-            Statement::ModalCall(program, from) => {
+            NamedStatement::ModalCall(program, from) => {
                 self.read_arguments(from)?;
                 self.state.modal_macro = Some((Jump::Named { program }, self.state.calls));
             }
-            Statement::ModalEnd => self.state.modal_macro = None,
-            Statement::Return => {
+            NamedStatement::ModalEnd => self.state.modal_macro = None,
+            NamedStatement::Return => {
                 self.state.jump = Some(Jump::Return { number: None });
                 self.execute_jump()?;
             }
-            Statement::WithoutEffect(name) => self.state.note_without_effect(name),
+            NamedStatement::WithoutEffect(name) => self.state.note_without_effect(name),
         }
         Ok(())
     }

@@ -19,14 +19,15 @@ pub(super) const PREFIX: &str = "_v_";
 /// Words of the graphics and the control without effect on the motion, at the start of a line.
 const WITHOUT_EFFECT: [&[u8]; 5] = [b"draw", b"clear", b"def", b"nomsg", b"pset"];
 const FUNCTIONS: [&[u8]; 13] = [
-    b"sin", b"cos", b"tan", b"asin", b"acos", b"atan", b"sqrt", b"abs", b"fix", b"fup", b"round", b"exp", b"ln",
+    b"sin", b"cos", b"tan", b"asin", b"acos", b"atan", b"sqrt", b"abs", b"fix", b"fup", b"round", b"exp",
+    b"ln",
 ];
 const OPERATORS: [&[u8]; 10] = [b"eq", b"ne", b"lt", b"le", b"gt", b"ge", b"and", b"or", b"xor", b"mod"];
 const AXES: &[u8] = b"xyzabcuvw";
 
 /// Statement of a translated line.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Statement {
+pub(super) enum NamedStatement {
     /// CALL: name of the program, and the byte at which its arguments begin.
     Call(String, usize),
     /// MODIN: name of the program that each motion calls.
@@ -40,24 +41,24 @@ pub(super) enum Statement {
 }
 
 /// Returns the statement of a translated line, if it has one.
-pub(super) fn statement(text: &[u8]) -> Option<Statement> {
+pub(super) fn statement(text: &[u8]) -> Option<NamedStatement> {
     let named = |rest: &[u8], keyword: usize| {
         let end = rest.iter().position(|byte| *byte == b' ').unwrap_or(rest.len());
         (String::from_utf8_lossy(&rest[..end]).into_owned(), keyword + end)
     };
     if let Some(rest) = text.strip_prefix(b"call") {
         let (name, from) = named(rest, 4);
-        return Some(Statement::Call(name, from + 1));
+        return Some(NamedStatement::Call(name, from + 1));
     }
     if let Some(rest) = text.strip_prefix(b"modin") {
         let (name, from) = named(rest, 5);
-        return Some(Statement::ModalCall(name, from + 1));
+        return Some(NamedStatement::ModalCall(name, from + 1));
     }
     match text {
-        b"modout" => Some(Statement::ModalEnd),
-        b"rts" => Some(Statement::Return),
+        b"modout" => Some(NamedStatement::ModalEnd),
+        b"rts" => Some(NamedStatement::Return),
         _ if WITHOUT_EFFECT.contains(&text) => {
-            Some(Statement::WithoutEffect(String::from_utf8_lossy(text).to_uppercase()))
+            Some(NamedStatement::WithoutEffect(String::from_utf8_lossy(text).to_uppercase()))
         }
         _ => None,
     }
@@ -86,9 +87,8 @@ pub(super) fn translate(line: &mut Vec<u8>) -> Outcome<Option<u32>> {
         b"rts" | b"modout" => line.extend_from_slice(first),
         b"call" | b"modin" => {
             let name = token(rest).strip_prefix(b"o").filter(|name| is_name(name));
-            let name = name.ok_or_else(|| {
-                format!("{}: the name of a program is required, as in O100", shown(text))
-            })?;
+            let name = name
+                .ok_or_else(|| format!("{}: the name of a program is required, as in O100", shown(text)))?;
             line.extend_from_slice(first);
             line.extend_from_slice(name);
             line.push(b' ');
@@ -131,7 +131,8 @@ fn line_number(name: &[u8]) -> Outcome<u32> {
         return Err(invalid());
     }
     let packed = name.iter().fold(0, |packed, byte| {
-        let digit = if byte.is_ascii_digit() { byte - b'0' + 1 } else { byte.to_ascii_lowercase() - b'a' + 11 };
+        let digit =
+            if byte.is_ascii_digit() { byte - b'0' + 1 } else { byte.to_ascii_lowercase() - b'a' + 11 };
         packed * NAME_BASE + u32::from(digit)
     });
     Ok(FIRST_NAME + packed)
@@ -154,7 +155,10 @@ fn shown(text: &[u8]) -> String {
 fn condition(text: &[u8], out: &mut Vec<u8>) -> Outcome<()> {
     let text = text.trim_ascii_start();
     if text.first() != Some(&b'[') {
-        return Err(format!("{}: IF requires a condition in brackets and a line, as in IF [VC1 EQ 1] N10", shown(text)));
+        return Err(format!(
+            "{}: IF requires a condition in brackets and a line, as in IF [VC1 EQ 1] N10",
+            shown(text)
+        ));
     }
     out.extend_from_slice(b"if");
     let mut at = 0;
@@ -165,7 +169,8 @@ fn condition(text: &[u8], out: &mut Vec<u8>) -> Outcome<()> {
 
 fn jump(text: &[u8], out: &mut Vec<u8>) -> Outcome<()> {
     let text = text.trim_ascii();
-    let name = text.strip_prefix(b"n").ok_or_else(|| format!("{}: a line is required, as in N10", shown(text)))?;
+    let name =
+        text.strip_prefix(b"n").ok_or_else(|| format!("{}: a line is required, as in N10", shown(text)))?;
     out.extend_from_slice(format!("goto{}", line_number(name)?).as_bytes());
     Ok(())
 }
@@ -254,7 +259,7 @@ fn expression(text: &[u8], at: &mut usize, out: &mut Vec<u8>, depth: usize) -> O
     while let Some(&byte) = text.get(*at) {
         match byte {
             b' ' => {
-                let joins = text[..*at].last().is_some_and(|before| is_operator(before))
+                let joins = text[..*at].last().is_some_and(is_operator)
                     || text[*at..].trim_ascii_start().first().is_some_and(is_operator);
                 if depth == 0 && !joins {
                     return Ok(());
@@ -308,7 +313,8 @@ fn operand(text: &[u8], at: &mut usize, out: &mut Vec<u8>, depth: usize) -> Outc
 fn variable(text: &[u8], at: &mut usize, out: &mut Vec<u8>, depth: usize) -> Outcome<()> {
     let name = name_at(text, *at);
     *at += name.len();
-    let number = name.strip_prefix(b"vc").and_then(|digits| str::from_utf8(digits).ok()?.parse::<usize>().ok());
+    let number =
+        name.strip_prefix(b"vc").and_then(|digits| str::from_utf8(digits).ok()?.parse::<usize>().ok());
     if let Some(number) = number {
         out.extend_from_slice(format!("#{}", COMMON + number.min(WORK_OFFSETS - COMMON - 1)).as_bytes());
         return Ok(());

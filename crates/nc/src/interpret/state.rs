@@ -134,6 +134,8 @@ pub(super) struct Modal {
     pub polar: Option<[f64; 2]>,
     /// Parts of the programmable frame: scaling (G51), mirroring (G51.1), rotation (G68).
     pub frames: [CoordinateFrame; 3],
+    /// Lines of a plane by points or vectors (G68.2 P2, P3) before its last one, by Q: a point, m, and a vector or angle.
+    pub plane_points: [Option<[Vector3<f64>; 2]>; 4],
     /// Programmed point of the last G28, m and rad.
     pub between: Coordinates,
     /// True with constant surface speed (G96).
@@ -194,6 +196,7 @@ impl State {
             radius_number: None,
             polar: None,
             frames: [CoordinateFrame::identity(); 3],
+            plane_points: [None; 4],
             between: [0.0; AXIS_COUNT],
             has_surface_speed: false,
             is_machine: false,
@@ -440,7 +443,8 @@ impl State {
             && self.dialect == Dialect::Okuma
         {
             // Variables of the control begin with V.
-            let missing = || format!("{}: the variable has no value: set it before it is used", name.to_uppercase());
+            let missing =
+                || format!("{}: the variable has no value: set it before it is used", name.to_uppercase());
             return name.starts_with('v').then_some(0.0).ok_or_else(missing);
         }
         value.ok_or_else(|| format!("#<{name}> has no value: set it before it is used"))

@@ -64,7 +64,9 @@ impl LineText {
                     }
                 }
                 b'\'' if dialect == Dialect::Mach3 => break,
-                b':' if matches!(dialect, Dialect::Fanuc | Dialect::Haas) && self.text.is_empty() => self.text.push(b'o'),
+                b':' if matches!(dialect, Dialect::Fanuc | Dialect::Haas) && self.text.is_empty() => {
+                    self.text.push(b'o')
+                }
                 b'!'..=b'~' => self.text.push(byte.to_ascii_lowercase()),
                 _ => {
                     return Err(format!(
@@ -98,7 +100,7 @@ impl LineText {
 
     /// Returns true if the text so far is at most a line number.
     fn is_before_words(&self) -> bool {
-        match self.text.split_first() {
+        match self.text.trim_ascii_end().split_first() {
             None => true,
             Some((b'n', digits)) => digits.iter().all(u8::is_ascii_digit),
             Some(_) => false,
