@@ -30,6 +30,8 @@ pub struct InterpreterOptions {
     pub work_offsets: Vec<Coordinates>,
     /// Indices of the work offsets that are given; `None` if none is an assumption.
     pub given_work_offsets: Option<BTreeSet<usize>>,
+    /// Upper travel limits, at which rapid traverses of Okuma end, m and rad.
+    pub upper_limits: Coordinates,
     /// Axis positions of G28 and G30, m and rad.
     pub references: [Coordinates; 2],
     /// Dialect; `None` detects it from the content of the program.
@@ -66,6 +68,7 @@ impl Default for InterpreterOptions {
             start: [0.0; AXIS_COUNT],
             work_offsets: vec![[0.0; AXIS_COUNT]; WORK_OFFSET_COUNT + ADDITIONAL_OFFSET_COUNT],
             given_work_offsets: None,
+            upper_limits: [f64::INFINITY; AXIS_COUNT],
             references: [[0.0; AXIS_COUNT]; 2],
             dialect: None,
             tools: ToolTable::default(),
@@ -94,8 +97,10 @@ impl InterpreterOptions {
         let geometry = *machine.kinematics();
         let transform = TipTransform::new(machine);
         let mut options = Self { axes: [false; AXIS_COUNT], ..Self::default() };
-        for axis in transform.joints.iter().flatten() {
+        for (axis, joint) in transform.joints.iter().zip(machine.axes()) {
+            let Some(axis) = axis else { continue };
             options.axes[*axis] = true;
+            options.upper_limits[*axis] = joint.limits().travel_max;
         }
         for offset in &mut options.work_offsets {
             offset[..3].copy_from_slice(&geometry.workpiece);

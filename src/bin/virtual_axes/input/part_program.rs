@@ -14,7 +14,7 @@ use virtual_axes_nc::plan::PlanOptions;
 use crate::builtin::PROGRAMS;
 
 /// Extensions of part programs.
-const EXTENSIONS: [&str; 8] = ["nc", "ngc", "tap", "cnc", "mpf", "gcode", "iso", "eia"];
+const EXTENSIONS: [&str; 10] = ["nc", "ngc", "tap", "cnc", "mpf", "spf", "min", "gcode", "iso", "eia"];
 /// Extensions of other inputs.
 const OTHER_EXTENSIONS: [&str; 5] = ["csv", "yaml", "yml", "mcap", "json"];
 /// Longest tool table, bytes.
@@ -30,7 +30,7 @@ pub struct PartProgramArguments {
     /// Feed override of a part program, 0 to 200 %: constant, or from times on, as in `0:100,2.5:0,4:120`.
     #[arg(long = "override", value_name = "PERCENT|S:PERCENT,…", allow_hyphen_values = true)]
     feed_override: Option<String>,
-    /// Dialect of a part program: linuxcnc, fanuc, haas, sinumerik, grbl or mach3 [default: detected from its content].
+    /// Dialect of a part program: linuxcnc, fanuc, haas, sinumerik, grbl, mach3 or okuma [default: detected from its content].
     #[arg(long, value_name = "DIALECT")]
     dialect: Option<Dialect>,
     /// Work offset of a part program, as in G54=120,80,-350: X, Y and Z in mm, then A, B and C in degrees. Repeatable.
