@@ -200,7 +200,6 @@ def test_the_setup_of_a_part_program_shifts_the_part_and_adds_its_times(tmp_path
         added = len(psec(program)) - len(plain)
         assert added * 0.002 == pytest.approx(4.5 + 1.25, abs=1e-9)
     # The parameters of a machine file apply where nothing is given.
-    head = "    machine: Vertical mill (representative)\n"
     shop = {"part_program.dialect": "fanuc", "part_program.work_offsets": ["G55=-400,-250,-420"]}
     shop |= {"part_program.tools": ["T1 Z62.5"], "part_program.tool_change_s": 4.5, "part_program.spindle_s": 1.25}
     mill = mill.with_(shop)

@@ -89,11 +89,11 @@ def nc_program(
     `[7, "M110"]`. `chord_error` bounds the chord error of the setpoints as a polyline, m, and
     `centripetal_acceleration` that of the tool tip, m/s².
 
-    What is not given is that of the machine file (`part_program`). `dialect` is linuxcnc, fanuc, haas, sinumerik, grbl or
-    mach3. `work_offset` has X, Y and Z in m, then A, B and C in rad, as in `{"G54": (0.12, 0.08, -0.35)}`, or texts in
-    mm and degrees, as the command: `"G54=120,80,-350"`. `tools` is the path of a tool table (tool.tbl of LinuxCNC, or
-    CSV, both in mm), or length and radius in m by number, as in `{1: (0.05, 0.005)}`. `tool_change_s` is the duration of
-    a tool change, and `spindle_s` that of a change of the spindle speed, s.
+    What is not given is that of the machine file (`part_program`). `dialect` is linuxcnc, fanuc, haas, sinumerik, grbl
+    or mach3. `work_offset` has X, Y and Z in m, then A, B and C in rad, as in `{"G54": (0.12, 0.08, -0.35)}`, or texts
+    in mm and degrees, as the command: `"G54=120,80,-350"`. `tools` is the path of a tool table (tool.tbl of LinuxCNC,
+    or CSV, both in mm), or length and radius in m by number, as in `{1: (0.05, 0.005)}`. `tool_change_s` is the
+    duration of a tool change, and `spindle_s` that of a change of the spindle speed, s.
 
     Raises `ValueError` for other values.
     """
