@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
-use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::config::{MachineConfig, PartProgramConfig};
 use virtual_axes_core::text::BuiltinFiles;
 use virtual_axes_core::trajectory::PathPlace;
 use virtual_axes_core::trial::{GridSource, SourceError};
@@ -76,40 +76,41 @@ impl OverrideSchedule {
 pub struct PartProgramOptions {
     /// Feed override.
     pub schedule: OverrideSchedule,
-    /// Dialect; `None` detects it.
+    /// Dialect; `None` for that of the machine, or the detected one.
     pub dialect: Option<Dialect>,
     /// Codes without effect.
     pub ignored: IgnoredCodes,
-    /// Work offsets that are given.
+    /// Work offsets in place of those of the machine.
     pub work_offsets: Vec<WorkOffset>,
-    /// Tool table; empty for tools of the length of the machine.
+    /// Tool table; empty for the tools of the machine.
     pub tools: ToolTable,
-    /// Duration of a tool change (M6), s.
-    pub tool_change_time: f64,
-    /// Duration of a change of the spindle speed (M3, M4, M5, S), s.
-    pub spindle_time: f64,
+    /// Duration of a tool change (M6), s; `None` for that of the machine.
+    pub tool_change_time: Option<f64>,
+    /// Duration of a change of the spindle speed (M3, M4, M5, S), s; `None` for that of the machine.
+    pub spindle_time: Option<f64>,
     /// Options of the feed planner.
     pub plan: PlanOptions,
 }
 
 impl PartProgramOptions {
-    /// Returns the options of the interpreter for a machine.
-    pub fn interpreter(&self, machine: &MachineConfig) -> InterpreterOptions {
-        let mut options = InterpreterOptions::for_machine(machine);
-        options.dialect = self.dialect;
+    /// Returns the options of the interpreter for a machine: those of the machine file, where none are given.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the machine file has an invalid work offset, tool or tool table.
+    pub fn interpreter(&self, machine: &MachineConfig) -> Result<InterpreterOptions, String> {
+        let setup = machine.part_program();
+        // A tool table replaces that of the machine file, which is not read then.
+        let without_tools = || PartProgramConfig { tools: None, tool_table: None, ..setup.clone() };
+        let setup = if self.tools.is_empty() { setup.clone() } else { without_tools() };
+        let mut options = InterpreterOptions::for_machine(machine).with_setup(&setup)?;
+        options.dialect = self.dialect.or(options.dialect);
         options.ignored.clone_from(&self.ignored);
-        options.tools.clone_from(&self.tools);
-        if !self.tools.is_empty() {
-            options.default_tool_length = Some(0.0);
-        }
-        for WorkOffset { index, coordinates } in &self.work_offsets {
-            options.work_offsets[*index] = *coordinates;
-            if let Some(given) = &mut options.given_work_offsets {
-                given.insert(*index);
-            }
-        }
-        (options.tool_change_time, options.spindle_time) = (self.tool_change_time, self.spindle_time);
-        options
+        options.set_tools(self.tools.clone());
+        self.work_offsets.iter().for_each(|offset| options.set_work_offset(offset));
+        options.tool_change_time = self.tool_change_time.unwrap_or(options.tool_change_time);
+        options.spindle_time = self.spindle_time.unwrap_or(options.spindle_time);
+        Ok(options)
     }
 }
 
@@ -216,7 +217,8 @@ impl<'a> PartProgramSource<'a> {
     ) -> Result<Self, String> {
         let file = open_program(name, builtin).map_err(|error| format!("{name}: {error}"))?;
         let subprogram_folder = program_folder(name, builtin);
-        let interpreter = InterpreterOptions { subprogram_folder, ..options.interpreter(machine) };
+        let interpreter = options.interpreter(machine).map_err(|error| format!("{name}: {error}"))?;
+        let interpreter = InterpreterOptions { subprogram_folder, ..interpreter };
         track.replace(ProgramTrack::default());
         let interpreter = Interpreter::new(file, name, interpreter);
         let planner = PartProgramPlanner::new(NotedSteps { interpreter, track }, machine, options.plan)
