@@ -15,7 +15,7 @@ use virtual_axes_core::units::{Nanoseconds, seconds};
 
 use super::setpoints::ProgramTrack;
 use crate::builtin::open_program;
-use crate::plan::ProgrammedPath;
+use crate::plan::{ProgrammedCorner, ProgrammedPath};
 
 /// Number of lines reported.
 const COUNT: usize = 10;
@@ -26,6 +26,11 @@ const BEFORE: usize = 16;
 const AFTER: usize = 16;
 /// Length of the programmed path that is kept before the window of setpoints, m.
 const KEPT_PATH: f64 = 0.05;
+/// Distance behind a corner, as a multiple of the distance from it and in addition, m, at which it is passed.
+const CORNER_REACH: f64 = 4.0;
+const CORNER_MARGIN: f64 = 1e-4;
+/// Distance before a corner from which on it is followed, m.
+const CORNER_AHEAD: f64 = 0.01;
 /// Smallest step of a setpoint that counts as motion, m or rad.
 const RESOLUTION: f64 = 1e-8;
 /// Change of direction in one step that is a reversal of the path, rad.
@@ -165,6 +170,26 @@ pub struct CycleError {
     pub blending: f64,
     /// Distance of the tool tip from the planned path, m.
     pub drives: f64,
+    /// True at rapid traverse.
+    pub is_rapid: bool,
+}
+
+/// Corner of the programmed path that is being passed.
+#[derive(Debug, Clone)]
+struct PassedCorner {
+    corner: ProgrammedCorner,
+    /// Smallest distance of the planned path, m.
+    planned: f64,
+    /// Smallest distance of the tool tip, m, with that position cycle and the number of its setpoint.
+    nearest: Option<(f64, CycleError, usize)>,
+}
+
+impl PassedCorner {
+    /// Returns true if the path has moved away from the corner.
+    fn is_passed(&self, path_position: f64) -> bool {
+        let reach = self.planned.max(self.nearest.map_or(0.0, |(distance, ..)| distance));
+        path_position > self.corner.path_position + CORNER_REACH * reach + CORNER_MARGIN
+    }
 }
 
 /// Setpoint with its line.
@@ -191,6 +216,8 @@ pub struct LineErrors {
     poses: VecDeque<(ToolPose, Nanoseconds, ToolPose)>,
     turn: StandingTurn,
     programmed: ProgrammedPath,
+    /// Corners that are being passed.
+    corners: VecDeque<PassedCorner>,
     /// Contour errors of motions at feed and at rapid traverse.
     sums: [ErrorSums; 2],
     /// Number of setpoints before the window.
@@ -218,6 +245,7 @@ impl LineErrors {
             passed: 0,
             turn: StandingTurn::default(),
             programmed: ProgrammedPath::default(),
+            corners: VecDeque::new(),
             sums: Default::default(),
             worst: Default::default(),
             last_tip: None,
@@ -251,6 +279,7 @@ impl LineErrors {
             self.passed += 1;
             self.programmed.drop_before(self.window[0].place.path_position - KEPT_PATH);
         }
+        self.plan_corners();
         self.explain(AFTER);
         let positions: Vec<f64> = samples().map(|sample| sample.position).collect();
         self.turn.push(pose, seconds(tick.time));
@@ -296,18 +325,62 @@ impl LineErrors {
                 contour_error,
                 blending,
                 drives,
+                is_rapid: place.programmed_feed.is_infinite(),
             };
             let orientation = Kinematics::orientation_error(&axis, &actual.axis);
             let before = if self.last_line.0 == place.line { self.last_line.1 } else { 0.0 };
             self.last_line = (place.line, orientation.max(before));
-            self.record(&found, nearest, time);
+            self.record(&found, self.passed + nearest);
+            self.pass_corners([last_tip.unwrap_or(actual.tip), actual.tip], path_position, &found, nearest);
             found
         })
     }
 
-    fn record(&mut self, cycle: &CycleError, index: usize, time: Nanoseconds) {
-        let PathPlace { line, programmed_feed, .. } = self.window[index].place;
-        let kind = usize::from(programmed_feed.is_infinite());
+    /// Adds the newest setpoint to the corners near it.
+    fn plan_corners(&mut self) {
+        let Some(newest) = self.window.back() else { return };
+        let before = self.window.iter().rev().nth(1).unwrap_or(newest);
+        while let Some(corner) = self.programmed.next_corner(newest.place.path_position + CORNER_AHEAD) {
+            self.corners.push_back(PassedCorner { corner, planned: f64::INFINITY, nearest: None });
+        }
+        for passed in &mut self.corners {
+            let planned = distance(&passed.corner.tip, &before.pose.tip, &newest.pose.tip).0;
+            passed.planned = passed.planned.min(planned);
+        }
+    }
+
+    /// Follows the corners of the programmed path near `path_position`: of a corner that is cut, the distance from the
+    /// planned path and from the tool path is the error.
+    fn pass_corners(
+        &mut self,
+        [before, tip]: [Vector3<f64>; 2],
+        path_position: f64,
+        cycle: &CycleError,
+        nearest: usize,
+    ) {
+        for passed in &mut self.corners {
+            let actual = distance(&passed.corner.tip, &before, &tip).0;
+            if passed.nearest.is_none_or(|(least, ..)| actual < least) {
+                passed.nearest = Some((actual, *cycle, self.passed + nearest));
+            }
+        }
+        while self.corners.front().is_some_and(|corner| corner.is_passed(path_position)) {
+            self.corners.pop_front().into_iter().for_each(|corner| self.record_corner(corner));
+        }
+    }
+
+    fn record_corner(&mut self, passed: PassedCorner) {
+        if let Some((actual, mut cycle, number)) = passed.nearest
+            && actual > cycle.contour_error
+        {
+            (cycle.contour_error, cycle.blending) = (actual, passed.planned);
+            self.record(&cycle, number);
+        }
+    }
+
+    fn record(&mut self, cycle: &CycleError, number: usize) {
+        let CycleError { line, time, .. } = *cycle;
+        let kind = usize::from(cycle.is_rapid);
         self.sums[kind].add(cycle);
         let (lines, error) = (&mut self.worst[kind], cycle.contour_error);
         let known = lines.iter().position(|(worst, _)| worst.line == line);
@@ -324,11 +397,11 @@ impl LineErrors {
         if let Some(index) = known {
             lines.remove(index);
         }
-        let (text, time, cause) = (String::new(), seconds(time), Cause::Feed);
+        let (text, cause) = (String::new(), Cause::Feed);
         let CycleError { blending, drives, .. } = *cycle;
         let entry = WorstLine { line, text, error, blending, drives, orientation, time, cause };
         let place = lines.partition_point(|(worst, _)| worst.error >= error);
-        lines.insert(place, (entry, Some(self.passed + index)));
+        lines.insert(place, (entry, Some(number)));
         lines.truncate(COUNT);
     }
 
@@ -393,6 +466,9 @@ impl LineErrors {
     ) -> io::Result<ProgramFigures> {
         while !self.poses.is_empty() {
             self.evaluate().iter().for_each(&mut visit);
+        }
+        for passed in std::mem::take(&mut self.corners) {
+            self.record_corner(passed);
         }
         self.explain(0);
         let numbers = self.worst.iter().flatten().map(|(worst, _)| worst.line).collect();

@@ -33,4 +33,4 @@ mod window;
 pub use chunk::PlannedChunk;
 pub use error::{FeedPlanError, StepError};
 pub use planner::{PartProgramPlanner, PlanOptions, PlannedSetpoint};
-pub use programmed::ProgrammedPath;
+pub use programmed::{ProgrammedCorner, ProgrammedPath};

@@ -14,6 +14,9 @@ use super::vector::MAX_JOINTS;
 const DEVIATION: f64 = 2e-9;
 /// Most halvings of a curve.
 const MAX_HALVINGS: u32 = 14;
+/// Smallest change of direction at a corner, rad, and shortest span with a direction, m.
+const CORNER_TURN: f64 = 0.05;
+const LEAST_LENGTH: f64 = 1e-9;
 /// Steps of Newton's method for a foot point.
 const NEWTON_STEPS: usize = 6;
 /// Search range around a place on the path, as a multiple of the distance from it, and its least value, m.
@@ -60,16 +63,48 @@ impl ProgrammedSpan {
     }
 }
 
+/// Corner of the programmed path.
+#[derive(Debug, Clone, Copy)]
+pub struct ProgrammedCorner {
+    /// Path position, m.
+    pub path_position: f64,
+    /// Tool tip in the workpiece frame, m.
+    pub tip: Vector3<f64>,
+}
+
 /// Programmed path ahead of and around the tool, in order.
 #[derive(Debug, Clone, Default)]
 pub struct ProgrammedPath {
     spans: VecDeque<ProgrammedSpan>,
+    corners: VecDeque<ProgrammedCorner>,
+    /// Direction at the end of the path.
+    direction: Option<Vector3<f64>>,
 }
 
 impl ProgrammedPath {
     /// Moves the spans of `path` to the end.
     pub fn append(&mut self, path: &mut ProgrammedPath) {
         self.spans.append(&mut path.spans);
+        self.corners.append(&mut path.corners);
+    }
+
+    /// Returns the next corner up to a path position, m, and removes it.
+    pub fn next_corner(&mut self, path_position: f64) -> Option<ProgrammedCorner> {
+        self.corners.front().filter(|corner| corner.path_position <= path_position)?;
+        self.corners.pop_front()
+    }
+
+    /// Appends a span, and a corner before it where the direction changes.
+    fn push_span(&mut self, span: ProgrammedSpan) {
+        let [tip, slope, bend] = span.coefficients;
+        if slope.norm() > LEAST_LENGTH {
+            let turn = self.direction.map_or(0.0, |before| before.angle(&slope));
+            if turn > CORNER_TURN {
+                self.corners.push_back(ProgrammedCorner { path_position: span.ends[0], tip });
+            }
+            self.direction = Some(slope + 2.0 * bend);
+        }
+        self.spans.push_back(span);
     }
 
     /// Drops the path before a path position, m.
@@ -109,13 +144,13 @@ impl ProgrammedPath {
             let [first, last] = [0.0, 1.0].map(|part| tip(place(part)));
             if curve.is_line() && !turns {
                 let span = ProgrammedSpan::new([start, start + to], [first, 0.5 * (first + last), last]);
-                self.spans.push_back(span);
+                self.push_span(span);
                 return;
             }
             let span = ProgrammedSpan::new([start + from, start + to], [first, tip(place(0.5)), last]);
             let is_close = |part: f64| (span.at(part) - tip(place(part))).norm() <= DEVIATION;
             if halvings == 0 || [0.25, 0.75].into_iter().all(is_close) {
-                self.spans.push_back(span);
+                self.push_span(span);
             } else {
                 let middle = place(0.5);
                 parts.extend([([middle, to], halvings - 1), ([from, middle], halvings - 1)]);
