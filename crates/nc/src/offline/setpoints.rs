@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 
 use virtual_axes_core::config::{MachineConfig, PartProgramConfig};
+use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::text::BuiltinFiles;
 use virtual_axes_core::trajectory::PathPlace;
 use virtual_axes_core::trial::{GridSource, SourceError};
@@ -15,7 +16,7 @@ use crate::interpret::{
     Occurrences, ProgramError, ToolTable, WorkOffset,
 };
 use crate::motion::{Blend, PathControl, ProgramEvent, ProgramStep};
-use crate::plan::{FeedPlanError, PartProgramPlanner, PlanOptions};
+use crate::plan::{FeedPlanError, PartProgramPlanner, PlanOptions, ProgrammedPath};
 
 /// Hour, s.
 const HOUR: f64 = 3600.0;
@@ -119,6 +120,8 @@ impl PartProgramOptions {
 pub struct ProgramTrack {
     /// Places of the setpoints in order.
     pub setpoints: VecDeque<PathPlace>,
+    /// Programmed path of these setpoints and beyond.
+    pub programmed: ProgrammedPath,
     /// Time from the first to the last setpoint, s.
     pub cycle_time: f64,
     /// Duration of all motions at their programmed feed, s.
@@ -192,6 +195,7 @@ impl Iterator for NotedSteps<'_> {
 /// Source of the setpoints of a part program.
 pub struct PartProgramSource<'a> {
     planner: PartProgramPlanner<'a>,
+    kinematics: Kinematics,
     name: &'a str,
     schedule: &'a OverrideSchedule,
     track: &'a RefCell<ProgramTrack>,
@@ -221,10 +225,12 @@ impl<'a> PartProgramSource<'a> {
         let interpreter = InterpreterOptions { subprogram_folder, ..interpreter };
         track.replace(ProgramTrack::default());
         let interpreter = Interpreter::new(file, name, interpreter);
-        let planner = PartProgramPlanner::new(NotedSteps { interpreter, track }, machine, options.plan)
+        let mut planner = PartProgramPlanner::new(NotedSteps { interpreter, track }, machine, options.plan)
             .map_err(|error| format!("{name}: {error}"))?;
+        planner.keep_programmed_path();
         Ok(Self {
             planner,
+            kinematics: Kinematics::new(machine),
             name,
             schedule: &options.schedule,
             track,
@@ -273,6 +279,7 @@ impl GridSource for PartProgramSource<'_> {
             return Err(self.too_long());
         }
         let Some(setpoint) = setpoint else { return Ok(false) };
+        self.planner.take_programmed_path(&self.kinematics, &mut track.programmed);
         row.copy_from_slice(setpoint.psec());
         self.is_rapid = setpoint.place.programmed_feed.is_infinite();
         track.setpoints.push_back(setpoint.place);
