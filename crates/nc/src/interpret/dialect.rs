@@ -292,7 +292,7 @@ const RULES: &[(u8, u32, Pattern)] = &[
     (SINUMERIK, 6, Word("G700")),
     (SINUMERIK, 3, Word("G153")),
     (SINUMERIK, 3, Word("G601")),
-    (SINUMERIK, 3, Word("M17")),
+    (SINUMERIK, 2, Word("M17")),
     (SINUMERIK, 4, Code("G4F")),
     (SINUMERIK, 6, Code("FFWON")),
     (SINUMERIK, 6, Code("COMPCAD")),
@@ -361,7 +361,7 @@ impl Pattern {
             Assignment => found(has_assignment(code), "an assignment with ="),
             Head => found(code.starts_with('$') && code.ends_with('%'), "the head $"),
             Pair(word, letter) => found(has_word(code, word) && code.contains(letter), word),
-            ConditionalLine => found(code.contains("IF[") && code.contains("]N"), "IF with a line"),
+            ConditionalLine => found(has_conditional_line(code), "IF with a line"),
             CommonVariable => found(has_common_variable(code), "a variable VC"),
         }
     }
@@ -411,6 +411,22 @@ fn is_o_word(code: &str) -> bool {
     rest.starts_with('<') || (keyword.len() < rest.len() && is_keyword)
 }
 
+/// Returns true for `IF[VC1EQ1]N10`: the name of a line follows the condition, which has no parameters of other controls.
+fn has_conditional_line(code: &str) -> bool {
+    let Some((before, condition)) = code.split_once("IF[") else { return false };
+    let mut depth = 1_u32;
+    let end = condition.find(|letter| {
+        depth = match letter {
+            '[' => depth + 1,
+            ']' => depth - 1,
+            _ => depth,
+        };
+        depth == 0
+    });
+    let is_followed = end.is_some_and(|end| condition[end + 1..].starts_with('N'));
+    is_followed && !before.starts_with('O') && !code.contains('#')
+}
+
 /// Returns true for `VC1` and `VC[1]`.
 fn has_common_variable(code: &str) -> bool {
     code.match_indices("VC").any(|(at, _)| {
@@ -457,6 +473,9 @@ mod tests {
             ("$PART.MIN%\nG0 X1\n", ("okuma", Some(1))),
             ("O1001\nG15 H1\nG56 Z10. H1\n", ("okuma", Some(2))),
             ("IF [VC1 EQ 2] N10\nX=VC2\n", ("okuma", Some(1))),
+            ("N5 IF [VTLCN EQ 2] NEXT\n", ("okuma", Some(1))),
+            ("o100 if [exists[#<p>] NE 1.]\n", ("linuxcnc", Some(1))),
+            ("M17\nG15\nG0 X1\n", ("linuxcnc", None)),
             ("#100=ACOS[0.5]\n#101=[#100*2]\nG0 X#101\n", ("linuxcnc", None)),
         ] {
             assert_eq!(detected(text), expected, "{text:?}");
