@@ -72,6 +72,8 @@ impl SourceHead {
 pub(super) struct LineSource<R> {
     reader: R,
     next: Place,
+    /// First line of the program, which a text without words may precede.
+    start: Place,
     /// Files of subprograms: text, and its place that is read next.
     files: Vec<(Cursor<Vec<u8>>, Encoding)>,
     encoding: Encoding,
@@ -95,10 +97,11 @@ impl<R: BufRead + Seek> LineSource<R> {
         let SourceHead { encoding, start, .. } = SourceHead::of(&mut reader);
         // An error of the operating system occurs again with the first line.
         let is_there = reader.seek(SeekFrom::Start(start.offset)).is_ok();
-        let next = if is_there { start } else { Place::START };
+        let start = if is_there { start } else { Place::START };
         Self {
             reader,
-            next,
+            next: start,
+            start,
             encoding,
             files: Vec::new(),
             program_line: 1,
@@ -136,15 +139,16 @@ impl<R: BufRead + Seek> LineSource<R> {
         self.next
     }
 
-    /// Continues at `place`.
+    /// Continues at `place`; the start of the file is the first line of the program.
     pub(super) fn jump(&mut self, place: Place) -> Outcome<()> {
+        let place = if place == Place::START { self.start } else { place };
         let start = SeekFrom::Start(place.offset);
         match place.file.checked_sub(1).and_then(|index| self.files.get_mut(index)) {
             Some((file, _)) => file.seek(start),
             None => self.reader.seek(start),
         }
         .map_err(|error| error.to_string())?;
-        self.has_text &= place.offset > 0;
+        self.has_text &= place != self.start && place.offset > 0;
         self.next = place;
         if place.file == 0 {
             self.program_line = place.lines.max(1);

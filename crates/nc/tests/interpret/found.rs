@@ -46,6 +46,16 @@ fn a_program_is_the_same_in_each_encoding() {
 fn text_before_the_percent_sign_is_no_program() {
     let text = "\n  PART 4711, REV B\nPOSTED FOR MILL\n\n%\nO0100\nG21\nG0 X7. Y1.\nM30\n%\n";
     assert_eq!(last(text.as_bytes().to_vec()), ([7.0, 1.0, 0.0], 8));
+    // Jumps and subprograms begin there too.
+    let text = "PART 4711\n%\nO0100\nN5 M98 P7\nM30\nO7\nG0 X2. Y3.\nM99\n%\n";
+    assert_eq!(last(text.as_bytes().to_vec()), ([2.0, 3.0, 0.0], 7));
+    let options = InterpreterOptions {
+        dialect: Some(Dialect::Sinumerik),
+        reports_all_errors: true,
+        ..InterpreterOptions::default()
+    };
+    let found = Interpreter::new(Cursor::new("9\n%N\nC\nC\n"), "part", options).take(100);
+    assert!(found.count() < 10, "an end");
     // Lines of a program before a percent sign are executed.
     assert_eq!(last(b"G21\nG0 X7. Y1.\n%\n".to_vec()), ([7.0, 1.0, 0.0], 2));
 }
