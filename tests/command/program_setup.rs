@@ -111,7 +111,7 @@ fn invalid_setups_name_the_parameter_and_the_remedy() {
     let program = folder.file("part.nc", "G0 X-1\nM2\n");
     let program = program.to_str().expect("UTF-8");
     for (setup, part) in [
-        ("dialect: okuma", "part_program.dialect = okuma: must be linuxcnc or fanuc or haas"),
+        ("dialect: heidenhain", "part_program.dialect = heidenhain: must be linuxcnc or fanuc or haas"),
         ("tool_change_s: -1.0", "part_program.tool_change_s = -1: must lie in 0 … 3600 s"),
         (
             "work_offsets: [\"G54=1,2\"]",
