@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 import re
 import time
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import gymnasium
@@ -121,6 +124,56 @@ def len_of(env: ContouringEnv, seed: int) -> int:
     return steps
 
 
+@pytest.mark.parametrize(
+    "copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))], ids=["deepcopy", "pickle"]
+)
+@pytest.mark.parametrize("cycles", [0, 1, 200, 700])
+def test_a_copy_goes_on_with_the_same_bits(copied: Callable, cycles: int) -> None:
+    options = {"motion": "corner-90", "feed": (2.0, 6.0), "randomize": {"x.friction.a": (1.0, 3.0)}, "settling": 20}
+    for env, shape in (
+        (gymnasium.make(ENVIRONMENT, **options).unwrapped, (2,)),
+        (ContouringVectorEnv(3, **options), (3, 2)),
+    ):
+        assert copied(env).reset(seed=3)[0].shape == env.reset(seed=3)[0].shape
+        random = np.random.default_rng(0)
+        for _ in range(cycles):
+            ended = env.step(random.uniform(-1, 1, shape))[2]
+            if shape == (2,) and ended:
+                env.reset()
+        other = copied(env)
+        for _ in range(300):
+            action = random.uniform(-1, 1, shape)
+            one, two = env.step(action), other.step(action)
+            assert np.array_equal(one[0], two[0]) and np.array_equal(one[1], two[1])
+            assert np.array_equal(one[4]["contour_error"], two[4]["contour_error"])
+            if shape == (2,) and one[2]:
+                assert np.array_equal(env.reset()[0], other.reset()[0])
+
+
+def test_parameters_are_drawn_for_each_machine_at_each_reset(machine: va.Machine) -> None:
+    psec = va.scenario("corner-90").psec(machine)
+    drawn: list[dict] = []
+
+    def draw(random: np.random.Generator) -> dict:
+        drawn.append({"x.position_loop.gain": float(random.uniform(1.0, 2.0)), "y.friction.a": 2.0})
+        return drawn[-1]
+
+    envs = ContouringVectorEnv(4, machine=machine, motion=psec, randomize=draw, settling=0)
+    envs.reset(seed=5)
+    assert len(drawn) == 4 and len({one["x.position_loop.gain"] for one in drawn}) == 4
+    expected = [machine.with_(one).simulate(psec, figures="axes").position for one in drawn]
+    for cycle in range(len(psec)):
+        _, _, ended, _, _ = envs.step(np.zeros((4, 2)))
+        for index in range(4):
+            assert np.array_equal(envs.stepper.position[index], expected[index][cycle + 1])
+    assert ended.all()
+    envs.step(np.zeros((4, 2)))
+    assert len(drawn) == 8
+    by_bounds = [ContouringVectorEnv(2, randomize={"x.position_loop.gain": (1.0, 2.0)}) for _ in range(2)]
+    seen = [env.reset(seed=1)[0] for env in by_bounds] + [env.step(np.zeros((2, 2)))[0] for env in by_bounds]
+    assert np.array_equal(seen[0], seen[1]) and np.array_equal(seen[2], seen[3])
+
+
 def test_the_vector_environment_is_at_least_5_times_as_fast_per_machine() -> None:
     one, many = ContouringEnv(), ContouringVectorEnv(64)
     one.reset()
@@ -165,6 +218,9 @@ def test_an_offset_of_the_velocity_setpoint_moves_an_axis_at_rest_by_its_gain(ma
         ({"motion": "nowhere"}, "nowhere"),
         ({"motion": np.zeros((5, 5)), "feed": (1.0, 2.0)}, "feed"),
         ({"preview": 0}, "preview 0"),
+        ({"randomize": {"x.gain": (1.0, 2.0)}}, "unknown parameter x.gain"),
+        ({"randomize": {"x.position_loop.gain": (-1.0, 2.0)}}, "x.position_loop.gain = -1"),
+        ({"randomize": {"x.position_loop.gain": (2.0, 1.0)}}, "the lower one first"),
     ],
 )
 def test_an_option_out_of_range_is_named(options: dict, text: str) -> None:

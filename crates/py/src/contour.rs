@@ -1,6 +1,6 @@
 //! Contour errors of steppers against the polyline through their setpoints.
 
-use numpy::{PyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use virtual_axes_core::assess::SetpointTracker;
 use virtual_axes_core::kinematics::Kinematics;
@@ -48,26 +48,31 @@ impl ContourTrackers {
         self.horizon
     }
 
-    /// Starts new paths of the machines `only` at the setpoints `psec`, (machines, 1 + horizon, axes).
-    fn reset(&mut self, psec: PyReadonlyArray3<'_, f64>, only: Vec<usize>) -> PyResult<()> {
-        let (found, rows) = (psec.shape(), self.horizon as usize + 1);
-        let needed = [self.trackers.len(), rows, self.axes];
-        if found != needed {
-            return Err(value_error(format!("psec has the shape {found:?}; it needs {needed:?}")));
+    /// Starts a new path of the machine `index` with the setpoints `psec`, (setpoints, axes); the search starts at
+    /// `segment`.
+    fn start(&mut self, index: usize, psec: PyReadonlyArray2<'_, f64>, segment: u64) -> PyResult<()> {
+        let (found, machines) = (psec.shape(), self.trackers.len());
+        if found[1] != self.axes {
+            return Err(value_error(format!(
+                "psec has the shape {found:?}; it needs (setpoints, {})",
+                self.axes
+            )));
         }
         let psec: Vec<f64> = psec.as_array().iter().copied().collect();
-        for index in only {
-            let Some(tracker) = self.trackers.get_mut(index) else {
-                return Err(value_error(format!("machine {index}: must be below {}", needed[0])));
-            };
-            let mut poses = psec[index * rows * self.axes..][..rows * self.axes]
-                .chunks(self.axes)
-                .map(|joints| self.kinematics.forward(joints));
-            let Some(start) = poses.next() else { continue };
-            *tracker = SetpointTracker::new(start);
-            poses.for_each(|pose| tracker.push(pose, false));
-        }
+        let Some(tracker) = self.trackers.get_mut(index) else {
+            return Err(value_error(format!("machine {index}: must be below {machines}")));
+        };
+        let mut poses = psec.chunks(self.axes).map(|joints| self.kinematics.forward(joints));
+        let Some(start) = poses.next() else { return Err(value_error("psec has no setpoints")) };
+        *tracker = SetpointTracker::new(start);
+        poses.for_each(|pose| tracker.push(pose, false));
+        tracker.search_from(segment);
         Ok(())
+    }
+
+    /// Returns the segments from which the next searches start.
+    fn segments(&self) -> Vec<u64> {
+        self.trackers.iter().map(SetpointTracker::last_nearest).collect()
     }
 
     /// Adds a setpoint to each path.

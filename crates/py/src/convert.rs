@@ -21,22 +21,28 @@ pub fn check_signals() -> Result<(), PyErr> {
     Python::attach(|py| py.check_signals())
 }
 
-/// Runs a long calculation without the global interpreter lock. A signal sets `stopped`, which the calculation reads, and
-/// its exception is returned.
+/// Runs a long calculation without the global interpreter lock, on `threads` threads or one per processor. A signal sets
+/// `stopped`, which the calculation reads, and its exception is returned.
+///
+/// The threads end with the call: a process that is forked between two calls has lost none of them.
 pub fn interruptible<T: Send>(
     py: Python<'_>,
-    stopped: &AtomicBool,
+    (stopped, threads): (&AtomicBool, Option<usize>),
     run: impl FnOnce() -> PyResult<T> + Send,
 ) -> PyResult<T> {
     /// Interval between two looks at signals.
     const POLL: Duration = Duration::from_millis(20);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.unwrap_or(0))
+        .build()
+        .map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
     py.detach(|| {
         // Python runs signal handlers in this thread only.
         thread::scope(|scope| {
             let (running, ended) = mpsc::channel::<()>();
             let worker = scope.spawn(move || {
                 let _running = running;
-                run()
+                pool.install(run)
             });
             let mut interrupt = None;
             while ended.recv_timeout(POLL) == Err(RecvTimeoutError::Timeout) {

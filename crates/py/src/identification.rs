@@ -13,11 +13,14 @@ use virtual_axes_identify::identify::{
     IdentificationOptions, RefinementScope,
 };
 use virtual_axes_identify::recording::{Conditioning, Finding, PsecShift, RawRecording, StatedValues};
-use virtual_axes_io::files::{Columns, RecordingOptions, read_recording};
+use virtual_axes_io::files::{
+    Columns, RecordingFormat, RecordingOptions, read_recording, read_recording_stream,
+};
 use virtual_axes_report::IdentificationPage;
 
 use crate::convert::{check_stopped, interruptible, value_error};
 use crate::machine::PyMachine;
+use crate::setpoints::csv;
 
 /// Recording as given by the caller.
 #[derive(FromPyObject)]
@@ -28,12 +31,16 @@ pub enum GivenRecording<'py> {
     /// Channels by name.
     #[pyo3(transparent)]
     Channels(BTreeMap<String, PyReadonlyArray1<'py, f64>>),
+    /// Names and values of the columns of a table, read as CSV.
+    Table(Vec<String>, Vec<PyReadonlyArray1<'py, f64>>),
 }
 
 /// Recording to read or to condition.
 enum Source {
     File(PathBuf),
     Raw(Box<RawRecording>),
+    /// Name and text of a table as CSV.
+    Table(String, String),
 }
 
 /// Shift of the setpoints in time.
@@ -70,6 +77,9 @@ impl GivenRecording<'_> {
     fn source(&self, number: usize) -> PyResult<Source> {
         let channels = match self {
             GivenRecording::File(path) => return Ok(Source::File(path.clone())),
+            GivenRecording::Table(names, columns) => {
+                return Ok(Source::Table(format!("recording {number}"), csv(names, columns)?));
+            }
             GivenRecording::Channels(channels) => channels,
         };
         let mut raw = RawRecording { name: format!("recording {number}"), ..RawRecording::default() };
@@ -185,6 +195,10 @@ fn raw(
     match source {
         Source::File(path) => read_recording(path, axis, reading).map_err(value_error),
         Source::Raw(raw) => Ok((raw.as_ref().clone(), Vec::new())),
+        Source::Table(name, text) => {
+            let reading = RecordingOptions { format: Some(RecordingFormat::Csv), ..reading.clone() };
+            read_recording_stream(text.as_bytes(), name, axis, &reading).map_err(value_error)
+        }
     }
 }
 
@@ -246,7 +260,7 @@ pub fn identify(
     let periods = machine.config.periods();
     let axis = (&machine.config.axes()[index], &periods);
     let stopped = AtomicBool::new(false);
-    let found = interruptible(py, &stopped, || {
+    let found = interruptible(py, (&stopped, None), || {
         let recordings = conditioned(&files, axis, reading, &of_files)?;
         let others = conditioned(&others, axis, reading, &of_others)?;
         let start = |_: &str| check_stopped(&stopped);

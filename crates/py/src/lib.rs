@@ -23,6 +23,8 @@ use pyo3::prelude::*;
 
 #[pymodule]
 mod _native {
+    use pyo3::prelude::*;
+
     #[pymodule_export]
     use super::contour::ContourTrackers;
     #[pymodule_export]
@@ -37,4 +39,9 @@ mod _native {
     use super::stepper::{Stepper, StepperState};
     #[pymodule_export]
     use super::tuning::tune;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use virtual_axes_core::config::{AxisKind, DEFAULT_MACHINE, Parameters};
@@ -10,7 +11,8 @@ use virtual_axes_core::units::seconds;
 use crate::convert::{from_value, value_error};
 use crate::design::{self, PyPredictionModel, PyRst};
 use crate::machine::PyMachine;
-use crate::simulate::{self, Given};
+use crate::setpoints;
+use crate::simulate::{self, Given, RecordOptions, Simulated};
 use crate::sweep::{self, SweepRow};
 
 #[pymethods]
@@ -70,21 +72,45 @@ impl PyMachine {
         Ok(found)
     }
 
-    #[pyo3(signature = (psec, signals, every_tick, figures))]
     fn simulate<'py>(
         &self,
         py: Python<'py>,
         psec: Given<'py>,
-        signals: Vec<String>,
-        every_tick: bool,
-        figures: &str,
-    ) -> PyResult<(Bound<'py, PyDict>, String, usize)> {
-        simulate::simulate(py, self, &psec, &signals, every_tick, figures)
+        loads: Option<PyReadonlyArray2<'py, f64>>,
+        options: RecordOptions,
+    ) -> PyResult<Simulated<'py>> {
+        simulate::simulate(py, self, &psec, loads, &options)
+    }
+
+    /// Returns the circles of the motion: plane, radius, direction, and arrays of angle and radial deviation.
+    fn circles<'py>(
+        &self,
+        py: Python<'py>,
+        psec: Given<'py>,
+        loads: Option<PyReadonlyArray2<'py, f64>>,
+    ) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        simulate::circles(py, self, &psec, loads)
+    }
+
+    /// Returns the setpoints of a table with times as `virtual_axes run` reads them from CSV, (setpoints, axes).
+    fn setpoints_over_time<'py>(
+        &self,
+        py: Python<'py>,
+        names: Vec<String>,
+        columns: Vec<PyReadonlyArray1<'py, f64>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        setpoints::over_time(py, self, &names, &columns)
     }
 
     /// Writes a trace of the motion, a row per position cycle.
-    fn write_trace<'py>(&self, py: Python<'py>, psec: Given<'py>, path: PathBuf) -> PyResult<()> {
-        simulate::write_trace(py, self, &psec, &path)
+    fn write_trace<'py>(
+        &self,
+        py: Python<'py>,
+        psec: Given<'py>,
+        loads: Option<PyReadonlyArray2<'py, f64>>,
+        path: PathBuf,
+    ) -> PyResult<()> {
+        simulate::write_trace(py, self, (&psec, loads), &path)
     }
 
     /// Returns the page of the motion as HTML.
@@ -92,10 +118,11 @@ impl PyMachine {
         &self,
         py: Python<'py>,
         psec: Given<'py>,
+        loads: Option<PyReadonlyArray2<'py, f64>>,
         title: &str,
         description: &str,
     ) -> PyResult<String> {
-        simulate::report(py, self, &psec, (title, description))
+        simulate::report(py, self, (&psec, loads), (title, description))
     }
 
     #[pyo3(signature = (variants, psec, figures, threads))]

@@ -2,9 +2,10 @@
 
 use std::cell::RefCell;
 use std::ffi::CString;
+use std::path::PathBuf;
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use virtual_axes_builtin::{PROGRAMS, SCENARIOS};
@@ -13,7 +14,8 @@ use virtual_axes_core::scenario::Scenario as CoreScenario;
 use virtual_axes_core::simulation::joint_limits;
 use virtual_axes_core::text::{builtin_names, builtin_text};
 use virtual_axes_core::trial::{GridRows, GridSource, ProgramSource};
-use virtual_axes_nc::interpret::IgnoredCodes;
+use virtual_axes_io::files::PsecCsvReader;
+use virtual_axes_nc::interpret::{IgnoredCodes, ToolTable};
 use virtual_axes_nc::offline::{OverrideSchedule, PartProgramOptions, PartProgramSource, ProgramTrack};
 use virtual_axes_nc::plan::PlanOptions;
 
@@ -65,6 +67,56 @@ impl Rows {
         let rows = self.values.len() / columns.max(1);
         PyArray1::from_vec(py, self.values).reshape([rows, columns])
     }
+}
+
+/// Returns a table as CSV; each number parses to the same bits.
+pub fn csv(names: &[String], columns: &[PyReadonlyArray1<'_, f64>]) -> PyResult<String> {
+    let columns: Vec<Vec<f64>> = columns.iter().map(|column| column.as_array().to_vec()).collect();
+    let rows = columns.first().map_or(0, Vec::len);
+    if columns.len() != names.len() || columns.iter().any(|column| column.len() != rows) {
+        return Err(value_error("the columns have different lengths"));
+    }
+    if let Some(name) = names.iter().find(|name| name.contains([',', ';', '\t', '\n', '\r', '"'])) {
+        return Err(value_error(format!(
+            "column {name:?}: a name must not have separators or quotation marks"
+        )));
+    }
+    let mut text = names.join(",");
+    for row in 0..rows {
+        let values: Vec<String> = columns.iter().map(|column| cell(column[row])).collect();
+        text.push('\n');
+        text.push_str(&values.join(","));
+    }
+    text.push('\n');
+    Ok(text)
+}
+
+/// Returns a number as text; one that is missing is empty.
+fn cell(value: f64) -> String {
+    if value.is_nan() { String::new() } else { value.to_string() }
+}
+
+/// Returns the setpoints of a table with times at the position cycles, as `virtual_axes run` reads them from CSV.
+pub fn over_time<'py>(
+    py: Python<'py>,
+    machine: &PyMachine,
+    names: &[String],
+    columns: &[PyReadonlyArray1<'py, f64>],
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let text = csv(names, columns)?;
+    let rows = py.detach(|| {
+        let (limits, period) = (joint_limits(&machine.config, ""), machine.config.periods().position);
+        let mut reader = PsecCsvReader::new(text.as_bytes(), "psec", period, &limits).map_err(value_error)?;
+        let (joints, axes) = (reader.joints().to_vec(), machine.config.axes().len());
+        let (mut row, mut values) = (vec![0.0; joints.len()], Vec::new());
+        while reader.next(&mut row).map_err(value_error)? {
+            let begin = values.len();
+            values.resize(begin + axes, 0.0);
+            joints.iter().zip(&row).for_each(|(&joint, &value)| values[begin + joint] = value);
+        }
+        Ok::<_, PyErr>(Rows { joints: (0..axes).collect(), values, rapid: Vec::new() })
+    })?;
+    rows.into_array(py)
 }
 
 /// Test motion of a scenario file, planned within the limits of a machine.
@@ -152,6 +204,24 @@ struct ProgramArguments {
     /// G and M codes without effect.
     #[pyo3(item)]
     ignore: Vec<String>,
+    /// Dialect; `None` for that of the machine, or the detected one.
+    #[pyo3(item)]
+    dialect: Option<String>,
+    /// Work offsets, as in `G54=120,80,-350`.
+    #[pyo3(item)]
+    work_offset: Vec<String>,
+    /// File with the tool table.
+    #[pyo3(item)]
+    tool_table: Option<PathBuf>,
+    /// Tools in the notation of LinuxCNC.
+    #[pyo3(item)]
+    tools: Vec<String>,
+    /// Duration of a tool change, s.
+    #[pyo3(item)]
+    tool_change_s: Option<f64>,
+    /// Duration of a change of the spindle speed, s.
+    #[pyo3(item)]
+    spindle_s: Option<f64>,
     /// Bound of the chord error, m.
     #[pyo3(item)]
     chord_error: Option<f64>,
@@ -162,7 +232,7 @@ struct ProgramArguments {
 
 impl ProgramArguments {
     fn options(&self) -> Result<PartProgramOptions, String> {
-        let ProgramArguments { feed_override, ignore, chord_error, centripetal_acceleration } = self;
+        let ProgramArguments { feed_override, ignore, chord_error, centripetal_acceleration, .. } = self;
         if !(*feed_override > 0.0 && *feed_override <= 2.0) {
             return Err(format!("feed_override {feed_override}: must be above 0 and at most 2"));
         }
@@ -173,20 +243,39 @@ impl ProgramArguments {
                 return Err(format!("{name} {bound}: must be above 0 and finite"));
             }
         }
+        for (name, time) in [("tool_change_s", self.tool_change_s), ("spindle_s", self.spindle_s)] {
+            if let Some(time) = time.filter(|time| !(*time >= 0.0 && time.is_finite())) {
+                return Err(format!("{name} {time}: must be at least 0 and finite"));
+            }
+        }
         let codes =
             ignore.iter().map(|code| code.parse().map_err(|error| format!("ignore {code:?}: {error}")));
+        let offset = |text: &String| text.parse().map_err(|error| format!("work_offset {error}"));
         let default = PlanOptions::default();
         Ok(PartProgramOptions {
             schedule: OverrideSchedule::constant(*feed_override),
             ignored: IgnoredCodes::new(codes.collect::<Result<_, _>>()?),
+            dialect: self.dialect.as_deref().map(str::parse).transpose()?,
+            work_offsets: self.work_offset.iter().map(offset).collect::<Result<_, _>>()?,
+            tools: self.tools()?,
+            tool_change_time: self.tool_change_s,
+            spindle_time: self.spindle_s,
             plan: PlanOptions {
                 chord_error: chord_error.unwrap_or(default.chord_error),
                 centripetal_acceleration: centripetal_acceleration
                     .unwrap_or(default.centripetal_acceleration),
                 ..default
             },
-            ..PartProgramOptions::default()
         })
+    }
+
+    fn tools(&self) -> Result<ToolTable, String> {
+        let table = match (&self.tool_table, &self.tools[..]) {
+            (Some(path), _) => ToolTable::from_file(path),
+            (None, []) => return Ok(ToolTable::default()),
+            (None, lines) => ToolTable::parse(&lines.join("\n")),
+        };
+        table.map_err(|error| format!("tools: {error}"))
     }
 }
 

@@ -4,14 +4,19 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-use numpy::PyReadonlyArray2;
+use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use virtual_axes_builtin::PROGRAMS;
+use virtual_axes_core::assess::{CircleTrace, PathDeviations};
 use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::kinematics::Kinematics;
+use virtual_axes_core::machine::check_input;
 use virtual_axes_core::path::Program;
-use virtual_axes_core::trial::{self, Measures, SetpointSource, Tick, Trial, TrialError, TrialOutcome};
+use virtual_axes_core::trial::{
+    self, Measures, RunOptions, SetpointSource, Tick, Trial, TrialError, TrialOutcome,
+};
 use virtual_axes_io::files::{figures_json, part_program_json, trace_writer};
 use virtual_axes_nc::offline::{LineErrors, ProgramFigures, ProgramTrack, line_texts};
 use virtual_axes_report::ToolPath;
@@ -20,7 +25,7 @@ use virtual_axes_report::runs::{ProgramReport, SimulatedRun, SimulationPage, con
 use crate::convert::{check_signals, value_error};
 use crate::machine::PyMachine;
 use crate::setpoints::{PartProgram, PyScenario, Rows};
-use crate::signals::{SIGNALS, SignalTable};
+use crate::signals::{SIGNALS, SignalTable, TOOL_SIGNALS, ToolDeviations, ToolSignals};
 
 /// Position cycles between two looks at signals.
 const CYCLES_PER_CHECK: u64 = 5_000;
@@ -147,62 +152,123 @@ impl Prepared {
     }
 }
 
+/// Signals of a run.
+struct Recorded {
+    signals: SignalTable,
+    tool: Option<(ToolSignals, ToolDeviations)>,
+}
+
 /// Returns the outcome and, with contour errors, the figures of a part program.
 fn run(
     machine: &PyMachine,
     prepared: &mut Prepared,
-    measures: Measures,
-    every_tick: bool,
-    table: &mut SignalTable,
+    (measures, every_tick): (Measures, bool),
+    loads: &[f64],
+    recorded: &mut Recorded,
 ) -> PyResult<(TrialOutcome, Option<ProgramFigures>)> {
+    let Recorded { signals: table, tool } = recorded;
+    let (mut tool, mut deviations) =
+        tool.as_mut().map_or((None, None), |(tool, deviations)| (Some(tool), Some(deviations)));
     let part = prepared.part.take().filter(|_| measures.contour);
     let mut part = part.map(|(track, name)| (LineErrors::new(&machine.config), track, name));
     let (trial, source) = (prepared.trial(machine, &machine.config, measures, false), prepared.source());
     let mut signals = SignalCheck::new();
     let callback = |tick: Tick<'_>| {
         table.push(tick.time, tick.machine);
+        if let Some(tool) = &mut tool {
+            tool.push(tick.machine);
+        }
         if let Some((lines, track, _)) = &mut part {
             lines.add(&tick, track);
         }
         if tick.position_instant { signals.cycle() } else { Ok(()) }
     };
-    let outcome = if every_tick {
-        trial::trace(&trial, source, callback)
-    } else {
-        trial::run(&trial, source, callback)
+    let mut on_deviations = |found: &PathDeviations| {
+        if let Some(table) = &mut deviations {
+            table.push(found, every_tick);
+        }
     };
+    let options =
+        RunOptions { every_tick, loads, on_deviations: Some(&mut on_deviations), ..RunOptions::default() };
+    let outcome = trial::run_with_options(&trial, source, options, callback);
     let outcome = outcome.map_err(|error| signals.error(error))?;
     let part = part.map(|(lines, track, name)| lines.finish(&name, PROGRAMS, &track, |_| {}));
     Ok((outcome, part.transpose()?))
 }
 
-/// Returns signals, figures as JSON and the number of setpoints.
+/// Choice of signals and figures of a run.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct RecordOptions {
+    signals: Vec<String>,
+    /// True to record the signals of the tool, if contour errors are evaluated.
+    tool: bool,
+    every_tick: bool,
+    figures: String,
+}
+
+/// Signals of the axes, signals of the tool, figures as JSON, and number of setpoints.
+pub type Simulated<'py> = (Bound<'py, PyDict>, Bound<'py, PyDict>, String, usize);
+
+/// Returns loads as rows of all axes, N or N·m.
+fn load_rows(machine: &PyMachine, loads: Option<PyReadonlyArray2<'_, f64>>) -> PyResult<Vec<f64>> {
+    let Some(loads) = loads else { return Ok(Vec::new()) };
+    let (axes, columns) = (machine.config.axes().len(), loads.as_array().ncols());
+    if columns != axes {
+        return Err(value_error(format!("loads have {columns} columns; they need {axes}, one per axis")));
+    }
+    let values: Vec<f64> = loads.as_array().iter().copied().collect();
+    for (index, &value) in values.iter().enumerate() {
+        let axis = machine.config.axes()[index % axes].name();
+        check_input(value)
+            .map_err(|error| value_error(format!("loads: row {} of {axis} is {error}", index / axes)))?;
+    }
+    Ok(values)
+}
+
+/// Returns the signals and figures of a run.
 pub fn simulate<'py>(
     py: Python<'py>,
     machine: &PyMachine,
     psec: &Given<'py>,
-    signals: &[String],
-    every_tick: bool,
-    figures: &str,
-) -> PyResult<(Bound<'py, PyDict>, String, usize)> {
-    let measures = measures(figures)?;
-    let mut table = SignalTable::new(signals).map_err(|name| {
-        let known = SIGNALS.map(|(name, _)| name).join(", ");
-        value_error(format!("signal {name:?} is unknown; known are {known}"))
+    loads: Option<PyReadonlyArray2<'py, f64>>,
+    options: &RecordOptions,
+) -> PyResult<Simulated<'py>> {
+    let measures = measures(&options.figures)?;
+    let signals = SignalTable::new(&options.signals).map_err(|name| {
+        let known: Vec<&str> = SIGNALS.iter().map(|(name, _)| *name).chain(TOOL_SIGNALS).collect();
+        value_error(format!("signal {name:?} is unknown; known are {}", known.join(", ")))
     })?;
+    let loads = load_rows(machine, loads)?;
+    let kinematics = Kinematics::new(&machine.config);
+    let has_orientation = kinematics.has_rotary_axis();
+    let has_tool = options.tool && measures.contour && kinematics.has_linear_axis();
+    let tool = has_tool.then(|| (ToolSignals::new(kinematics), ToolDeviations::default()));
+    let mut recorded = Recorded { signals, tool };
     let mut prepared = psec.prepare(py, machine)?;
-    let (outcome, part) = py.detach(|| run(machine, &mut prepared, measures, every_tick, &mut table))?;
+    let (outcome, part) =
+        py.detach(|| run(machine, &mut prepared, (measures, options.every_tick), &loads, &mut recorded))?;
     let mut json = figures_json(&outcome.figures);
     if let Some(part) = part {
         json.insert("part_program".to_owned(), part_program_json(&part));
     }
     let json = serde_json::Value::Object(json).to_string();
     let setpoints = prepared.rows.values.len() / prepared.rows.joints.len().max(1);
-    Ok((table.into_dict(py, machine.config.axes().len())?, json, setpoints))
+    let tool = match recorded.tool {
+        Some((tool, deviations)) => deviations.into_dict(py, tool, has_orientation)?,
+        None => PyDict::new(py),
+    };
+    Ok((recorded.signals.into_dict(py, machine.config.axes().len())?, tool, json, setpoints))
 }
 
 /// Simulates setpoints again and writes the trace of `virtual_axes run --trace`, a row per position cycle.
-pub fn write_trace(py: Python<'_>, machine: &PyMachine, psec: &Given<'_>, path: &Path) -> PyResult<()> {
+pub fn write_trace(
+    py: Python<'_>,
+    machine: &PyMachine,
+    (psec, loads): (&Given<'_>, Option<PyReadonlyArray2<'_, f64>>),
+    path: &Path,
+) -> PyResult<()> {
+    let loads = load_rows(machine, loads)?;
     let prepared = psec.prepare(py, machine)?;
     let names: Vec<String> = machine.config.axes().iter().map(|axis| axis.name().to_owned()).collect();
     py.detach(|| {
@@ -215,7 +281,9 @@ pub fn write_trace(py: Python<'_>, machine: &PyMachine, psec: &Given<'_>, path: 
             writer.row(tick.time, &samples)
         };
         let trial = prepared.trial(machine, &machine.config, Measures::AXES, false);
-        trial::run(&trial, prepared.source(), callback).map_err(|error| signals.error(error))?;
+        let options = RunOptions { loads: &loads, ..RunOptions::default() };
+        trial::run_with_options(&trial, prepared.source(), options, callback)
+            .map_err(|error| signals.error(error))?;
         Ok(writer.finish()?)
     })
 }
@@ -225,9 +293,10 @@ pub fn write_trace(py: Python<'_>, machine: &PyMachine, psec: &Given<'_>, path: 
 pub fn report(
     py: Python<'_>,
     machine: &PyMachine,
-    psec: &Given<'_>,
+    (psec, loads): (&Given<'_>, Option<PyReadonlyArray2<'_, f64>>),
     (title, description): (&str, &str),
 ) -> PyResult<String> {
+    let loads = load_rows(machine, loads)?;
     let mut prepared = psec.prepare(py, machine)?;
     py.detach(|| {
         let mut signals = SignalCheck::new();
@@ -241,8 +310,9 @@ pub fn report(
             if tick.position_instant { signals.cycle() } else { Ok(()) }
         };
         let trial = prepared.trial(machine, &machine.config, Measures::ALL, true);
-        let outcome =
-            trial::run(&trial, prepared.source(), callback).map_err(|error| signals.error(error))?;
+        let options = RunOptions { loads: &loads, ..RunOptions::default() };
+        let outcome = trial::run_with_options(&trial, prepared.source(), options, callback)
+            .map_err(|error| signals.error(error))?;
         let part_program = match part {
             Some((lines, track, name)) => {
                 let figures = lines.finish(&name, PROGRAMS, &track, |cycle| path.add(cycle))?;
@@ -274,4 +344,34 @@ pub fn report(
         page.write(&mut text)?;
         String::from_utf8(text).map_err(value_error)
     })
+}
+
+/// Simulates setpoints again and returns the circles at constant feed: `plane`, `radius` (m), `counterclockwise`, and the
+/// arrays `angle` (rad) and `deviation` (m).
+pub fn circles<'py>(
+    py: Python<'py>,
+    machine: &PyMachine,
+    psec: &Given<'py>,
+    loads: Option<PyReadonlyArray2<'py, f64>>,
+) -> PyResult<Vec<Bound<'py, PyDict>>> {
+    let loads = load_rows(machine, loads)?;
+    let prepared = psec.prepare(py, machine)?;
+    let outcome = py.detach(|| {
+        let mut signals = SignalCheck::new();
+        let trial = prepared.trial(machine, &machine.config, Measures::ALL, true);
+        let options = RunOptions { loads: &loads, ..RunOptions::default() };
+        trial::run_with_options(&trial, prepared.source(), options, |_| signals.cycle())
+            .map_err(|error| signals.error(error))
+    })?;
+    let traces = outcome.recording.map(|recording| recording.circles).unwrap_or_default();
+    let dictionary = |trace: CircleTrace| {
+        let found = PyDict::new(py);
+        found.set_item("plane", trace.plane.to_vec())?;
+        found.set_item("radius", trace.radius)?;
+        found.set_item("counterclockwise", trace.counterclockwise)?;
+        found.set_item("angle", PyArray1::from_vec(py, trace.angle))?;
+        found.set_item("deviation", PyArray1::from_vec(py, trace.deviation))?;
+        Ok(found)
+    };
+    traces.into_iter().map(dictionary).collect()
 }

@@ -18,15 +18,21 @@ const RELEASING: usize = 16;
 /// Most machines of a stepper.
 const MOST: usize = 100_000;
 
-/// Function that creates an object again, and its arguments: parameters as YAML, number of machines, and state.
-type Recreation<'py> = (Bound<'py, PyAny>, (String, usize, Bound<'py, PyBytes>));
+/// State of a stepper: parameters as YAML, once for equal machines in a row with their number, and state of the axes.
+type Saved<'py> = (Vec<(String, usize)>, Bound<'py, PyBytes>);
+
+/// Function that creates an object again, and its arguments.
+type Recreation<'py> = (Bound<'py, PyAny>, Saved<'py>);
+
+/// Parameters of a machine of a stepper.
+type Variant = (Arc<Parameters>, Arc<MachineParameters>);
 
 /// Simulation of one or several equal machines, stepped by position cycles.
 #[pyclass(module = "virtual_axes_py._native")]
 #[derive(Clone)]
 pub struct Stepper {
-    /// Parameters of one machine.
-    parameters: Parameters,
+    /// Parameters of each machine.
+    parameters: Vec<Variant>,
     machine: CoreMachine,
     /// Axes of one machine.
     axes: usize,
@@ -37,37 +43,51 @@ pub struct Stepper {
 #[pyclass(module = "virtual_axes_py._native", frozen)]
 pub struct StepperState(Stepper);
 
-/// Returns the parameters of a number of equal machines.
-fn repeated(machine: &PyMachine, machines: usize) -> PyResult<Arc<MachineParameters>> {
-    if machines == 1 {
-        return Ok(Arc::clone(&machine.discretized));
+/// Returns the machines side by side.
+fn concatenated(machines: &[Variant]) -> PyResult<Arc<MachineParameters>> {
+    match machines {
+        [(_, one)] => return Ok(Arc::clone(one)),
+        all if (1..=MOST).contains(&all.len()) => {}
+        all => return Err(value_error(format!("machines {}: must be from 1 to {MOST}", all.len()))),
     }
-    if !(1..=MOST).contains(&machines) {
-        return Err(value_error(format!("machines {machines}: must be from 1 to {MOST}")));
-    }
-    let copies = vec![Arc::clone(&machine.discretized); machines];
-    MachineParameters::concatenate(&copies)
+    let all: Vec<Arc<MachineParameters>> = machines.iter().map(|(_, one)| Arc::clone(one)).collect();
+    MachineParameters::concatenate(&all)
         .map(Arc::new)
-        .ok_or_else(|| value_error("a stepper needs at least one machine"))
+        .ok_or_else(|| value_error("the machines of a stepper need equal periods"))
+}
+
+/// Returns the parameters of a machine with the axes of the others.
+fn variant(machine: &PyMachine, axes: usize) -> PyResult<Variant> {
+    let found = machine.config.axes().len();
+    if found != axes {
+        return Err(value_error(format!(
+            "the machine {} has {found} axes; it needs {axes}",
+            machine.config.name()
+        )));
+    }
+    Ok((Arc::new(machine.parameters.clone()), Arc::clone(&machine.discretized)))
 }
 
 impl Stepper {
     /// Returns the arguments of [`Self::from_bytes`].
-    fn to_bytes<'py>(&self, py: Python<'py>) -> (String, usize, Bound<'py, PyBytes>) {
-        let state = PyBytes::new(py, &self.machine.state_bytes());
-        (self.parameters.to_yaml("", |_| None), self.machines, state)
+    fn to_bytes<'py>(&self, py: Python<'py>) -> Saved<'py> {
+        let equal = self.parameters.chunk_by(|(_, one), (_, other)| Arc::ptr_eq(one, other));
+        let texts = equal.filter_map(|rows| Some((rows.first()?.0.to_yaml("", |_| None), rows.len())));
+        (texts.collect(), PyBytes::new(py, &self.machine.state_bytes()))
     }
 
-    /// Creates a stepper from parameters as YAML, the number of machines and their state.
-    fn from_bytes(parameters: &str, machines: usize, state: &[u8]) -> PyResult<Self> {
-        let machine = PyMachine::new(Parameters::from_yaml(parameters, "state").map_err(value_error)?)?;
-        let parameters = repeated(&machine, machines)?;
-        Ok(Stepper {
-            machine: CoreMachine::from_state_bytes(parameters, state).map_err(value_error)?,
-            axes: machine.config.axes().len(),
-            parameters: machine.parameters,
-            machines,
-        })
+    /// Creates a stepper from parameters as YAML with the numbers of machines, and their state.
+    fn from_bytes(texts: &[(String, usize)], state: &[u8]) -> PyResult<Self> {
+        let (mut parameters, mut axes) = (Vec::new(), None);
+        for (text, count) in texts {
+            let machine = PyMachine::new(Parameters::from_yaml(text, "state").map_err(value_error)?)?;
+            let axes = *axes.get_or_insert(machine.config.axes().len());
+            let one = variant(&machine, axes)?;
+            parameters.extend(std::iter::repeat_n(one, (*count).min(MOST + 1)));
+        }
+        let machine =
+            CoreMachine::from_state_bytes(concatenated(&parameters)?, state).map_err(value_error)?;
+        Ok(Stepper { machine, axes: axes.unwrap_or(0), machines: parameters.len(), parameters })
     }
 
     /// Returns the values of an array with one value per axis of each machine.
@@ -110,19 +130,20 @@ impl Stepper {
 #[pymethods]
 impl Stepper {
     #[new]
-    #[pyo3(signature = (machine, machines = 1))]
-    fn new(machine: &PyMachine, machines: usize) -> PyResult<Self> {
-        Ok(Stepper {
-            parameters: machine.parameters.clone(),
-            machine: CoreMachine::new(repeated(machine, machines)?),
-            axes: machine.config.axes().len(),
-            machines,
-        })
+    fn new(machines: Vec<PyRef<'_, PyMachine>>) -> PyResult<Self> {
+        let axes = machines.first().map_or(0, |machine| machine.config.axes().len());
+        let mut parameters: Vec<Variant> = Vec::with_capacity(machines.len());
+        for machine in &machines {
+            let same = parameters.last().filter(|(_, last)| Arc::ptr_eq(last, &machine.discretized)).cloned();
+            parameters.push(same.map_or_else(|| variant(machine, axes), Ok)?);
+        }
+        let machine = CoreMachine::new(concatenated(&parameters)?);
+        Ok(Stepper { machine, axes, machines: parameters.len(), parameters })
     }
 
     #[staticmethod]
-    fn load(parameters: &str, machines: usize, state: &[u8]) -> PyResult<Self> {
-        Stepper::from_bytes(parameters, machines, state)
+    fn load(parameters: Vec<(String, usize)>, state: &[u8]) -> PyResult<Self> {
+        Stepper::from_bytes(&parameters, state)
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Recreation<'py>> {
@@ -207,10 +228,18 @@ impl Stepper {
         Ok(())
     }
 
-    fn set_machine(&mut self, machine: &PyMachine) -> PyResult<()> {
-        let parameters = repeated(machine, self.machines)?;
-        self.machine.update_parameters(parameters).map_err(value_error)?;
-        self.parameters = machine.parameters.clone();
+    /// Gives the machines with these indices the parameters of another one.
+    fn set_machines(&mut self, machines: Vec<PyRef<'_, PyMachine>>, only: Vec<usize>) -> PyResult<()> {
+        let mut parameters = self.parameters.clone();
+        for (index, machine) in only.into_iter().zip(&machines) {
+            let count = self.machines;
+            let Some(slot) = parameters.get_mut(index) else {
+                return Err(value_error(format!("machine {index}: must be below {count}")));
+            };
+            *slot = variant(machine, self.axes)?;
+        }
+        self.machine.update_parameters(concatenated(&parameters)?).map_err(value_error)?;
+        self.parameters = parameters;
         Ok(())
     }
 
@@ -287,8 +316,8 @@ impl Stepper {
 #[pymethods]
 impl StepperState {
     #[staticmethod]
-    fn load(parameters: &str, machines: usize, state: &[u8]) -> PyResult<Self> {
-        Stepper::from_bytes(parameters, machines, state).map(StepperState)
+    fn load(parameters: Vec<(String, usize)>, state: &[u8]) -> PyResult<Self> {
+        Stepper::from_bytes(&parameters, state).map(StepperState)
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Recreation<'py>> {

@@ -2,7 +2,6 @@
 
 use std::sync::atomic::AtomicBool;
 
-use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
@@ -111,17 +110,12 @@ pub fn sweep<'py>(
         })
         .collect::<PyResult<_>>()?;
     let stopped = AtomicBool::new(false);
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
-    let outcomes = interruptible(py, &stopped, || {
+    let outcomes = interruptible(py, (&stopped, Some(threads)), || {
         let sweep = Sweep { base, prepared: &prepared, measures, stopped: &stopped };
         let valid: Vec<MachineConfig> =
             configs.iter().filter_map(|config| config.as_ref().ok().cloned()).collect();
         let batches: Vec<&[MachineConfig]> = valid.chunks(BATCH).collect();
-        let found: Vec<Outcome> =
-            pool.install(|| batches.par_iter().flat_map_iter(|batch| sweep.run(batch)).collect());
+        let found: Vec<Outcome> = batches.par_iter().flat_map_iter(|batch| sweep.run(batch)).collect();
         let mut found = found.into_iter();
         let of_variant = |config: &Result<MachineConfig, String>| match config {
             Ok(_) => found.next().unwrap_or_else(|| Err("not simulated".to_owned())),

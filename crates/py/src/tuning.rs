@@ -108,5 +108,5 @@ pub fn tune(
         let tuned = found.best.tuning.apply(problem.parameters(), problem.joints()).map_err(value_error)?;
         Ok((Value::Object(json).to_string(), PyMachine::new(tuned)?))
     };
-    interruptible(py, &stopped, run)
+    interruptible(py, (&stopped, None), run)
 }

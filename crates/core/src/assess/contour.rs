@@ -105,6 +105,16 @@ impl ContourTracker {
         self.count += 1;
     }
 
+    /// Returns the segment from which the next search starts.
+    pub fn last_nearest(&self) -> u64 {
+        self.nearest
+    }
+
+    /// Starts the next search at a segment.
+    pub fn search_from(&mut self, segment: u64) {
+        self.nearest = segment.min(self.count);
+    }
+
     /// Returns the number of setpoints added.
     pub fn count(&self) -> u64 {
         self.count

@@ -71,6 +71,16 @@ impl SetpointTracker {
         self.feet.segment.iter().map(move |&k| self.rapid[ring_index((k + 1).min(newest))])
     }
 
+    /// Returns the segment from which the next search starts, counted from 0.
+    pub fn last_nearest(&self) -> u64 {
+        self.contour.last_nearest()
+    }
+
+    /// Starts the next search at a segment, as after the searches of an equal tracker.
+    pub fn search_from(&mut self, segment: u64) {
+        self.contour.search_from(segment);
+    }
+
     /// Returns the point of the polyline closest to `pose`.
     pub fn nearest(&mut self, pose: &ToolPose) -> NearestPoint {
         self.contour.nearest(&<[f64; 3]>::from(pose.tip).map(|value| [value]), &mut self.feet);

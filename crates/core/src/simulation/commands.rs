@@ -208,6 +208,12 @@ impl Simulation {
         self.loads.set(axis, load, until);
     }
 
+    /// Sets an external force or torque on an axis beside that of [`set_load`](Self::set_load), from the next position cycle
+    /// until it is set again or the machine is reset. The simulation is not busy because of it.
+    pub fn set_lasting_load(&mut self, axis: usize, load: f64) {
+        self.loads.set_lasting(axis, load);
+    }
+
     /// Replaces gains, weights or delays at the next position cycle.
     ///
     /// # Errors

@@ -169,7 +169,7 @@ impl Simulation {
         if !self.has_moved && self.timeline.is_stream_moving() {
             self.advance_at_rest();
         }
-        self.has_moved |= self.motions.is_any_running() || self.loads.is_any_active();
+        self.has_moved |= self.motions.is_any_running() || self.loads.is_any_acting();
         if self.has_moved {
             self.motions.push_preview(&self.timeline);
             self.loads.apply(&mut self.machine, k);

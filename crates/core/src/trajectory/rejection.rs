@@ -114,6 +114,18 @@ impl Rejection {
         self
     }
 
+    /// Returns the rejection with the index of the point increased by `count`, the number of points before the trajectory
+    /// in its source.
+    #[must_use]
+    pub fn behind(mut self, count: usize) -> Self {
+        if let Some(index) = &mut self.index {
+            let [here, there] = [*index, *index + count].map(|index| format!(", point {index}:"));
+            *index += count;
+            self.text = self.text.replacen(&here, &there, 1);
+        }
+        self
+    }
+
     /// Sets the value found and its limit.
     #[must_use]
     pub fn numbers(mut self, value: f64, limit: f64) -> Self {

@@ -21,7 +21,7 @@ pub use figures::{
     AxisFigures, BidirectionalFigures, CircleFigures, ContourFigures, CornerFigures, Figures,
     OrientationFigures, RapidFigures, Reference,
 };
-pub use run::{run, run_compensated, trace};
+pub use run::{RunOptions, run, run_compensated, run_with_options, trace};
 pub use setpoints::{
     GridRows, GridSource, ProgramSource, Requests, SetpointSource, SourceError, UnreachableError,
 };

@@ -147,6 +147,11 @@ impl<'a> Observer<'a> {
         self.trial.measures != Measures::AXES
     }
 
+    /// Returns the deviations of the tool at the ticks of the last position cycle; `None` without contour errors.
+    pub(super) fn deviations(&self) -> Option<&PathDeviations> {
+        self.tracker.as_ref().map(|_| &self.deviations)
+    }
+
     /// Adds a position cycle; `axis` returns the machine of an axis and its index there.
     pub(super) fn observe<'m>(
         &mut self,

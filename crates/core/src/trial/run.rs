@@ -2,6 +2,7 @@
 
 use std::io;
 
+use crate::assess::PathDeviations;
 use crate::simulation::{Simulation, joint_limits};
 
 use super::cycle::PositionCycle;
@@ -9,6 +10,20 @@ use super::definition::{Tick, Trial, TrialError, TrialOutcome};
 use super::observer::Observer;
 use super::setpoints::SetpointSource;
 use super::submitter::TrajectorySubmitter;
+
+/// Inputs and outputs of a run beyond its setpoints and figures.
+#[derive(Default)]
+pub struct RunOptions<'a> {
+    /// True if the callback is called at every tick, false if at every position cycle.
+    pub every_tick: bool,
+    /// External loads from time 0, N or N·m: a row of all axes per position cycle, of which the last one holds; empty for
+    /// none.
+    pub loads: &'a [f64],
+    /// Receiver of the deviations of the tool at the ticks of each position cycle, if contour errors are evaluated.
+    pub on_deviations: Option<&'a mut dyn FnMut(&PathDeviations)>,
+    /// Programmed setpoints that contour errors are measured against without a known path, as for [`run_compensated`].
+    pub programmed: Option<&'a [f64]>,
+}
 
 /// Runs `setpoints` until the axes have settled and calls `callback` at every position cycle.
 ///
@@ -23,7 +38,7 @@ pub fn run(
     setpoints: SetpointSource<'_>,
     callback: impl FnMut(Tick<'_>) -> io::Result<()>,
 ) -> Result<TrialOutcome, TrialError> {
-    run_with(trial, setpoints, None, cycle_step(callback))
+    run_with_options(trial, setpoints, RunOptions::default(), callback)
 }
 
 /// Runs compensated `setpoints` as [`run`] does and measures contour errors against the `programmed` ones where the path
@@ -40,7 +55,24 @@ pub fn run_compensated(
     programmed: &[f64],
     callback: impl FnMut(Tick<'_>) -> io::Result<()>,
 ) -> Result<TrialOutcome, TrialError> {
-    run_with(trial, setpoints, Some(programmed), cycle_step(callback))
+    let options = RunOptions { programmed: Some(programmed), ..RunOptions::default() };
+    run_with_options(trial, setpoints, options, callback)
+}
+
+/// Runs `setpoints` as [`run`] does, with further inputs and outputs.
+///
+/// # Errors
+/// Returns [`TrialError`] as [`run`] does.
+pub fn run_with_options(
+    trial: &Trial<'_>,
+    setpoints: SetpointSource<'_>,
+    options: RunOptions<'_>,
+    callback: impl FnMut(Tick<'_>) -> io::Result<()>,
+) -> Result<TrialOutcome, TrialError> {
+    match options.every_tick {
+        true => run_with(trial, setpoints, options, tick_step(trial, callback)),
+        false => run_with(trial, setpoints, options, cycle_step(callback)),
+    }
 }
 
 /// Returns a step of one position cycle that calls `callback`.
@@ -62,10 +94,18 @@ fn cycle_step(
 pub fn trace(
     trial: &Trial<'_>,
     setpoints: SetpointSource<'_>,
-    mut callback: impl FnMut(Tick<'_>) -> io::Result<()>,
+    callback: impl FnMut(Tick<'_>) -> io::Result<()>,
 ) -> Result<TrialOutcome, TrialError> {
+    run_with_options(trial, setpoints, RunOptions { every_tick: true, ..RunOptions::default() }, callback)
+}
+
+/// Returns a step of one position cycle that calls `callback` at every tick.
+fn tick_step(
+    trial: &Trial<'_>,
+    mut callback: impl FnMut(Tick<'_>) -> io::Result<()>,
+) -> impl FnMut(&mut Simulation) -> io::Result<bool> {
     let tick = trial.machine.periods().current;
-    run_with(trial, setpoints, None, |simulation| {
+    move |simulation| {
         let mut time = simulation.time_of(simulation.next_instant());
         let mut result = Ok(());
         let ran = simulation.step_with(|machine, position_instant| {
@@ -75,19 +115,20 @@ pub fn trace(
             time += tick;
         });
         result.map(|()| ran)
-    })
+    }
 }
 
 /// Runs `setpoints`; `step` computes a position cycle and returns true if the machine advanced.
 fn run_with(
     trial: &Trial<'_>,
     setpoints: SetpointSource<'_>,
-    programmed: Option<&[f64]>,
+    mut options: RunOptions<'_>,
     mut step: impl FnMut(&mut Simulation) -> io::Result<bool>,
 ) -> Result<TrialOutcome, TrialError> {
     let (mut simulation, mut submitter, start) = start(trial, setpoints)?;
     let mut observer = Observer::new(trial, &start);
-    if let Some(rows) = programmed {
+    let mut loads = options.loads.chunks_exact(start.len().max(1));
+    if let Some(rows) = options.programmed {
         observer.set_programmed(rows);
     }
     let mut cycle = PositionCycle::new(trial.machine.periods(), start.len());
@@ -98,6 +139,9 @@ fn run_with(
         }
         let is_moving = simulation.has_active_commands();
         observer.push_preview(&simulation, |instant| submitter.is_rapid(instant));
+        for (axis, &load) in loads.next().into_iter().flatten().enumerate() {
+            simulation.set_lasting_load(axis, load);
+        }
         let time = simulation.time_of(simulation.next_instant());
         if step(&mut simulation).map_err(TrialError::Callback)? {
             let machine = simulation.machine();
@@ -106,6 +150,11 @@ fn run_with(
                 (0..start.len()).for_each(|index| cycle.store_positions(index, machine, index));
             }
             observer.observe(|index| (machine, index), &mut cycle);
+            if let (Some(on_deviations), Some(deviations)) =
+                (&mut options.on_deviations, observer.deviations())
+            {
+                on_deviations(deviations);
+            }
         }
     }
     Ok(observer.finish())

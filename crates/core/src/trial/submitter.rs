@@ -166,7 +166,21 @@ impl<'a> TrajectorySubmitter<'a> {
             max_points: usize::MAX,
             allow_nonzero_end_velocity: self.allow_nonzero_end_velocity,
         };
-        let rejected = |rejection| TrialError::Rejected { time: seconds(due), rejection };
+        let start = match request.start() {
+            Start::Now => due,
+            Start::At(stamp) => stamp.max(due),
+        };
+        let before = match &self.source {
+            PendingSource::Grid { .. } => usize::try_from(due / self.period).unwrap_or(0),
+            PendingSource::Requests { .. } => 0,
+        };
+        let times: Vec<Nanoseconds> =
+            (0..request.points()).filter_map(|index| request.point(index)).map(|(time, _)| time).collect();
+        let rejected = |rejection: Rejection| {
+            let offset = rejection.index.and_then(|index| times.get(index)).copied().unwrap_or(0);
+            let time = seconds(start.saturating_add(offset));
+            TrialError::Rejected { time, rejection: rejection.behind(before) }
+        };
         let trajectory = Arc::new(Trajectory::new(request, &context).map_err(rejected)?);
         self.sent += 1;
         simulation.submit(MotionId(self.sent), trajectory).map_err(rejected)?;

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +29,14 @@ def to_floats(name: str, values: Any) -> NDArray[np.float64]:
     if array.dtype.kind not in "buif":
         raise TypeError(f"{name} has elements of type {array.dtype}; it must have real numbers")
     return array.astype(np.float64)
+
+
+def to_path(name: str, value: Any) -> str:
+    """Returns a name or path as a text; raises `TypeError` for anything else."""
+    try:
+        return os.fsdecode(value)
+    except TypeError:
+        raise TypeError(f"{name} is of type {type(value).__name__}; it must be a name or a path") from None
 
 
 def to_whole(name: str, value: Any, least: int, most: int) -> int:

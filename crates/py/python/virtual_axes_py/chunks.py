@@ -26,7 +26,7 @@ Outcome = tuple[str | None, str | None]
 Variants = Sequence[Mapping[str, Any]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SweepResult:
     """Result of one variant."""
 
@@ -42,6 +42,10 @@ class SweepResult:
         """Creates the result of an outcome."""
         text, error = outcome
         return SweepResult(dict(changes), None if text is None else json.loads(text), error)
+
+    def __repr__(self) -> str:
+        """Returns the changes, and the error of a variant that failed."""
+        return f"SweepResult({self.changes})" if self.error is None else f"SweepResult({self.changes}, {self.error!r})"
 
     def row(self) -> dict[str, Any]:
         """Returns parameters, figures with joined keys as `axes.x.peak_current_a`, and `error`."""

@@ -8,7 +8,7 @@ print(design.margins(model, rst).modulus)
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -19,7 +19,11 @@ from .machine import Machine
 if TYPE_CHECKING:
     import control
     import numpy as np
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
+
+    ControlLoop = Literal["current", "velocity", "position", "contour"]
 
 __all__ = [
     "FrequencyResponse",
@@ -35,6 +39,7 @@ __all__ = [
     "of_machine",
     "pid",
     "place_poles",
+    "plot_bode",
     "poles",
     "rst",
     "to_control",
@@ -57,7 +62,7 @@ class Margins:
     """Delay margin, s; infinite without crossover."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FrequencyResponse:
     """Frequency response of a control loop, open and closed, as `virtual_axes bode --csv` writes it."""
 
@@ -72,16 +77,44 @@ class FrequencyResponse:
     closed_deg: NDArray[np.float64]
     """Phase of the closed loop without jumps, °."""
 
+    def __repr__(self) -> str:
+        """Returns the number and range of the frequencies."""
+        low, high = self.frequency_hz[0], self.frequency_hz[-1]
+        return f"FrequencyResponse({len(self.frequency_hz)} frequencies, {low:.6g} … {high:.6g} Hz)"
 
-def frequency_response(
-    machine: Machine, axis: str, control_loop: Literal["current", "velocity", "position", "contour"] = "position"
-) -> FrequencyResponse:
+    def plot(self, *, ax: Iterable[Axes] | None = None) -> Figure:
+        """Draws magnitude (dB) and phase (°) of both loops over the frequency (Hz); see `plot_bode`."""
+        from . import plots
+
+        return plots.plot_bode({"loop": self}, ax)
+
+
+def frequency_response(machine: Machine, axis: str, control_loop: ControlLoop = "position") -> FrequencyResponse:
     """Computes the frequency response of a control loop of an axis, as `virtual_axes bode` does.
 
     The plant has its deviation; friction, limits, feedforward and delays are left out. Raises `ValueError` for an
     unknown axis or loop, and for the position loop over unstable inner loops.
     """
     return FrequencyResponse(**to_native(machine).frequency_response(axis, control_loop))
+
+
+def plot_bode(
+    machine: Machine,
+    axes: str | Sequence[str] | None = None,
+    control_loop: ControlLoop = "position",
+    *,
+    ax: Iterable[Axes] | None = None,
+) -> Figure:
+    """Draws magnitude (dB) and phase (°) of an open and closed control loop over the frequency (needs matplotlib).
+
+    `axes` are the axes of the machine, by default all. `ax` are two axes of matplotlib to draw in; without them a
+    figure of pyplot is created, which `plt.show()` shows. Returns the figure. Raises `ValueError` as
+    `frequency_response`.
+    """
+    from . import plots
+
+    names = machine.axes if axes is None else [axes] if isinstance(axes, str) else list(axes)
+    return plots.plot_bode({name: frequency_response(machine, name, control_loop) for name in names}, ax)
 
 
 def model(machine: Machine, axis: str) -> PredictionModel:
@@ -185,20 +218,69 @@ def loop_transfer(model: PredictionModel, rst: Rst) -> control.TransferFunction:
     return to_control(model) * control.TransferFunction(numerator, denominator, model.period)
 
 
-def from_control(system: control.TransferFunction) -> PredictionModel:
-    """Converts a discrete transfer function with one input and output from python-control.
+def from_control(
+    system: control.TransferFunction | control.StateSpace, *, period: float | None = None
+) -> PredictionModel:
+    """Converts a discrete system with one input and one output from python-control: `tf`, `zpk` or `ss`.
 
-    Raises `ValueError` for a continuous or an improper system.
+    `period` is the position cycle, s: that of a discrete system without a period of its own (`dt=True`), and otherwise
+    compared with it. Raises `ValueError` for a continuous system, another period, several inputs or outputs, or more
+    zeros than poles; `TypeError` for anything else.
     """
-    if not (isinstance(system.dt, float | int) and not isinstance(system.dt, bool) and system.dt > 0):
-        raise ValueError(f"the period of the system is {system.dt}; it must be discrete with a period above 0 s")
-    numerator, denominator = [float(x) for x in system.num[0][0]], [float(x) for x in system.den[0][0]]
+    import control
+
+    if not isinstance(system, control.TransferFunction | control.StateSpace):
+        raise TypeError(f"system is of type {type(system).__name__}; it must be a TransferFunction or a StateSpace")
+    if (system.ninputs, system.noutputs) != (1, 1):
+        found = f"{system.ninputs} inputs and {system.noutputs} outputs"
+        raise ValueError(f"the system has {found}; it must have one of each: select them, as system[0, 0]")
+    if isinstance(system, control.StateSpace):
+        numerator, denominator = _of_states(system)
+    else:
+        numerator, denominator = ([float(x) for x in rows[0][0]] for rows in (system.num, system.den))
+    found_period = _period(system.dt, period)
+    numerator = _trimmed(numerator)
     delay = len(denominator) - len(numerator)
     if delay < 0:
-        raise ValueError("the system has more zeros than poles")
+        raise ValueError(f"the system has {len(numerator) - 1} zeros and {len(denominator) - 1} poles; at most as many")
     leading = denominator[0]
     b = [0.0] * delay + [value / leading for value in numerator]
-    return PredictionModel([value / leading for value in denominator], b, float(system.dt))
+    return PredictionModel([value / leading for value in denominator], b, found_period)
+
+
+def _period(dt: float | bool | None, wanted: float | None) -> float:
+    """Returns the period of a discrete system, s."""
+    if wanted is not None and not (wanted > 0 and math.isfinite(wanted)):
+        raise ValueError(f"period {wanted}: must be above 0 s and finite")
+    if dt is True and wanted is not None:
+        return wanted
+    if isinstance(dt, bool) or dt is None or dt <= 0:
+        remedy = "give period" if dt is True else "control.sample_system(system, period, 'zoh') samples it"
+        raise ValueError(f"the period of the system is {dt}; it must be discrete with a period above 0 s: {remedy}")
+    if wanted is not None and not math.isclose(dt, wanted, rel_tol=1e-9):
+        raise ValueError(f"the period of the system is {dt:.6g} s; it must be {wanted:.6g} s, as of the machine")
+    return float(dt)
+
+
+def _of_states(system: control.StateSpace) -> tuple[list[float], list[float]]:
+    """Returns numerator and denominator of a state space with one input and output, highest power first."""
+    import numpy as np
+
+    a, b, c, d = (np.asarray(matrix, dtype=np.float64) for matrix in (system.A, system.B, system.C, system.D))
+    denominator = np.real(np.poly(a)) if len(a) else np.ones(1)
+    # Impulse response D, CB, CAB, …: its product with the denominator is the numerator.
+    impulse, state = [float(d[0, 0])], b
+    for _ in range(len(a)):
+        impulse.append(float((c @ state)[0, 0]))
+        state = a @ state
+    numerator = np.convolve(denominator, impulse)[: len(denominator)]
+    return [float(x) for x in numerator], [float(x) for x in denominator]
+
+
+def _trimmed(polynomial: list[float]) -> list[float]:
+    """Returns a polynomial, highest power first, without leading zeros."""
+    first = next((index for index, value in enumerate(polynomial) if value != 0), len(polynomial) - 1)
+    return polynomial[first:]
 
 
 def _in_z(numerator: list[float], denominator: list[float]) -> tuple[list[float], list[float]]:

@@ -12,7 +12,8 @@ one `Stepper`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,8 @@ from numpy.typing import NDArray
 from . import _native
 from .machine import Machine
 from .stepper import Stepper
+from .study import draw, random_variants
+from .tables import columns_of
 
 try:
     import gymnasium
@@ -37,7 +40,9 @@ ENVIRONMENT = "VirtualAxes/Contouring-v0"
 
 Array = NDArray[np.float64]
 Observation = NDArray[np.float32]
-Motion = str | _native.Scenario | Array | Callable[[np.random.Generator], Array]
+Motion = str | os.PathLike[str] | _native.Scenario | Array | Callable[[np.random.Generator], Array]
+Randomization = Mapping[str, tuple[float, float]] | Callable[[np.random.Generator], Mapping[str, Any]]
+"""Bounds of parameters by key, or a function that draws changed parameters."""
 
 LARGEST = 100.0
 """Bound of the observations, in their units."""
@@ -52,7 +57,7 @@ class _Fleet:
         self,
         machines: int,
         *,
-        machine: Machine | str | None = None,
+        machine: Machine | str | os.PathLike[str] | None = None,
         motion: Motion = "ballbar",
         feed: tuple[float, float] | None = None,
         axes: Sequence[str] | None = None,
@@ -61,6 +66,7 @@ class _Fleet:
         preview: int = 8,
         settling: int = 50,
         error_scale: float = 1e-5,
+        randomize: Randomization | None = None,
     ) -> None:
         """Checks the options, which `ContouringEnv` documents."""
         self.machine = machine if isinstance(machine, Machine) else Machine.load(machine)
@@ -69,6 +75,7 @@ class _Fleet:
         if preview < 1 or settling < 0 or not error_scale > 0:
             raise ValueError(f"preview {preview}, settling {settling}, error_scale {error_scale}: out of range")
         names = self.machine.axes
+        self._motion, self._randomize = (motion, feed), self._checked_ranges(randomize)
         self._plan = self._planner(motion, feed)
         self._action, self._preview, self._settling, self._scale = action, preview, settling, error_scale
         self.stepper = Stepper(self.machine, machines)
@@ -105,16 +112,20 @@ class _Fleet:
     def _planner(self, motion: Motion, feed: tuple[float, float] | None) -> Callable[[np.random.Generator], Array]:
         """Returns a function that draws a motion, (setpoints, axes)."""
         if feed is not None:
-            if not isinstance(motion, str):
+            if not isinstance(motion, str | os.PathLike):
                 raise ValueError("feed: needs the name or path of a scenario as motion")
-            name, (low, high) = motion, feed
+            name, (low, high) = os.fspath(motion), feed
             if not 0 < low <= high < np.inf:
                 raise ValueError(f"feed {feed}: must be two positive numbers, the lower one first")
             return lambda random: _native.Scenario.load(name, float(random.uniform(low, high))).psec(self.machine)
         if callable(motion):
             return motion
-        given = _native.Scenario.load(motion) if isinstance(motion, str) else motion
-        rows = given.psec(self.machine) if isinstance(given, _native.Scenario) else given
+        given = _native.Scenario.load(os.fspath(motion)) if isinstance(motion, str | os.PathLike) else motion
+        if isinstance(given, _native.Scenario):
+            given = given.psec(self.machine)
+        elif columns_of("motion", given) is not None:
+            given = np.asarray(self.machine.setpoints(given))
+        rows = given
         return lambda random: rows
 
     def _drawn(self, random: np.random.Generator) -> Array:
@@ -126,6 +137,38 @@ class _Fleet:
         if psec.shape[1] != self._shape[1] or not len(psec) or not np.isfinite(psec).all():
             raise ValueError(f"motion of the shape {psec.shape}: must be finite, (setpoints, {self._shape[1]})")
         return psec
+
+    def _checked_ranges(self, randomize: Randomization | None) -> Randomization | None:
+        """Returns the randomization; raises `ValueError` for an unknown parameter or bounds out of its range."""
+        if randomize is None or callable(randomize):
+            return randomize
+        for key, bounds in random_variants(0, 0, randomize).bounds.items():
+            for bound in bounds:
+                self.machine.with_({key: bound})
+        return dict(randomize)
+
+    def _variant(self, random: np.random.Generator) -> Machine:
+        """Returns the machine with parameters drawn by a generator."""
+        if callable(self._randomize):
+            return self.machine.with_(dict(self._randomize(random)))
+        bounds = dict(self._randomize or {})
+        return self.machine.with_({key: draw(random, low, high) for key, (low, high) in bounds.items()})
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Returns the state without plan and search of the nearest points, which are made again."""
+        kept = {name: value for name, value in self.__dict__.items() if name not in ("_plan", "_trackers")}
+        return {**kept, "_segments": self._trackers.segments()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restores a state: the copy goes on with the same bits."""
+        segments = state.pop("_segments")
+        self.__dict__.update(state)
+        self._plan = self._planner(*self._motion)
+        self._trackers = _native.ContourTrackers(self.machine.native, self._shape[0])
+        if self._psec.shape[1]:
+            for index, segment in enumerate(segments):
+                known = self.cycle[index] + self._trackers.horizon + 1
+                self._trackers.start(index, self._psec[index, :known], segment)
 
     def _moving(self, psec: Array) -> list[str]:
         """Returns the axes that move."""
@@ -143,9 +186,12 @@ class _Fleet:
             self._psec[index, : len(psec)], self._psec[index, len(psec) :] = psec, psec[-1]
             self._ends[index] = len(psec) + self._settling
         self.cycle[only] = 0
+        if self._randomize is not None:
+            self.stepper._set_machines([self._variant(random[index]) for index in only], only.tolist())
         start = self._psec[:, 0]
         self.stepper.reset(start if self._shape[0] > 1 else start[0], only=only.tolist())
-        self._trackers.reset(self._psec[:, : self._trackers.horizon + 1], only.tolist())
+        for index in only:
+            self._trackers.start(int(index), self._psec[index, : self._trackers.horizon + 1], 0)
 
     def step(self, actions: NDArray[np.float32]) -> tuple[Array, NDArray[np.bool_]]:
         """Advances by one position cycle; returns contour errors, m, and true for each motion that has ended."""
@@ -228,6 +274,9 @@ class ContouringEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
           of the motor (default 0.1).
         - `preview`, `settling`: numbers of position cycles (default 8 and 50).
         - `error_scale`: contour error with the reward −1, m (default 1e-5).
+        - `randomize`: parameters that are drawn at each reset, for each machine by itself: bounds `(low, high)` by key,
+          as of `Machine.with_`, or a function that draws changed parameters by a `numpy.random.Generator`. Periods
+          and axes must stay; observations have the limits of `machine`.
 
         Raises `ValueError` for an option out of range, `TypeError` for an unknown one.
         """

@@ -12,12 +12,30 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from .arguments import to_floats, to_native
+from .arguments import to_floats, to_native, to_path
 from .machine import Machine
+from .tables import columns_of
 
 if TYPE_CHECKING:
-    Recording = str | os.PathLike[str] | Mapping[str, ArrayLike]
+    from .tables import Table
+
+    Recording = str | os.PathLike[str] | Mapping[str, ArrayLike] | Table
     Feedforward = Literal["off", "velocity", "both"]
+    Source = str | dict[str, NDArray[np.float64]] | tuple[list[str], list[NDArray[np.float64]]]
+
+
+CHANNELS = (
+    "time",
+    "psec",
+    "position",
+    "velocity",
+    "current",
+    "torque",
+    "velocity_feedforward",
+    "torque_feedforward",
+    "motor_position",
+)
+"""Names of the channels of a recording, in SI."""
 
 
 class Identification:
@@ -98,9 +116,10 @@ def identify(
 
     `recordings` are files (CSV, MCAP, exports of controls) or dictionaries of equally long channels: `time` (s),
     `position` and `psec` (m or rad), `velocity` (m/s or rad/s of the axis), `current` (A), `torque` (N·m),
-    `velocity_feedforward` (rad/s of the motor), `torque_feedforward` (N·m) and
-    `motor_position` (m or rad at the axis). `machine` (default:
-    the first built-in one) has the initial values.
+    `velocity_feedforward` (rad/s of the motor), `torque_feedforward` (N·m) and `motor_position` (m or rad at the axis);
+    or tables, as a DataFrame of pandas or polars, whose columns are either these channels or are read as those of CSV:
+    names and units as `x.position`, `ENC_POS|1 [mm]`, or those of `column`. A named index is a column. `machine`
+    (default: the first built-in one) has the initial values.
 
     The options are those of the command: `transmission` are recordings with the encoders of motor and load, to identify
     stiffness, damping, inertia of the load and backlash, beside `recordings` or alone with `[]`; `validate` are
@@ -138,16 +157,22 @@ def identify(
     return Identification(_native.identify(native, axis, files, both, others, options))
 
 
-def _sources(given: Recording | Sequence[Recording]) -> list[str | dict[str, Any]]:
+def _sources(given: Recording | Sequence[Recording]) -> list[Source]:
     """Returns recordings as the native module takes them."""
-    several = [given] if isinstance(given, str | os.PathLike | Mapping) else list(given)
-    found: list[str | dict[str, Any]] = []
-    for one in several:
-        if isinstance(one, Mapping):
-            found.append({name: _channel(name, values) for name, values in one.items()})
-        else:
-            found.append(os.fspath(one))
-    return found
+    several = given if isinstance(given, list | tuple) else [given]
+    return [_source(one) for one in several]
+
+
+def _source(given: Any) -> Source:
+    """Returns a recording as the native module takes it: a path, channels, or names and values of columns."""
+    if isinstance(given, Mapping) and not hasattr(given, "data_vars"):
+        return {name: _channel(name, values) for name, values in given.items()}
+    columns = None if isinstance(given, str | os.PathLike) else columns_of("recording", given)
+    if columns is None:
+        return to_path("recording", given)
+    if all(name in CHANNELS for name in columns):
+        return columns
+    return list(columns), [np.ascontiguousarray(values) for values in columns.values()]
 
 
 def _channel(name: str, values: ArrayLike) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from .arguments import to_floats
+from .arguments import to_floats, to_path
 from .run import Run
+from .tables import TIME, axis_columns, axis_values
 
 if TYPE_CHECKING:
-    Setpoints = NDArray[np.float64] | Mapping[str, ArrayLike] | _native.Scenario | _native.PartProgram
+    from .tables import Table
+
+    Setpoints = NDArray[np.float64] | Mapping[str, ArrayLike] | Table | _native.Scenario | _native.PartProgram
+    Loads = ArrayLike | Mapping[str, ArrayLike] | Table
     Parameter = bool | int | float | str | Sequence[bool] | Sequence[int] | Sequence[float] | Sequence[str]
 
 SIGNALS = (
@@ -36,6 +41,9 @@ SIGNALS = (
 )
 """Names of the signals of an axis: m or rad at the axis, rad/s and N·m at the motor, A, V; effort in N or N·m."""
 
+TOOL_SIGNALS = ("contour_error", "orientation_error", "tool_path", "tool_setpoint", "feed")
+"""Names of the signals of the tool: m and rad; path and setpoints of the tip in the workpiece frame, m; feed, m/s."""
+
 
 class Machine:
     """Machine with checked parameters; immutable.
@@ -53,12 +61,14 @@ class Machine:
         self._native = native
 
     @staticmethod
-    def load(name_or_path: str | None = None) -> Machine:
+    def load(name_or_path: str | os.PathLike[str] | None = None) -> Machine:
         """Loads a built-in machine (`machine_names()`, by default the first) or a machine file.
 
         Raises `ValueError` with file, line, parameter, value and allowed range.
         """
-        return Machine(_native.Machine.load() if name_or_path is None else _native.Machine.load(name_or_path))
+        if name_or_path is None:
+            return Machine(_native.Machine.load())
+        return Machine(_native.Machine.load(to_path("name_or_path", name_or_path)))
 
     @staticmethod
     def from_yaml(text: str, source: str = "text") -> Machine:
@@ -75,6 +85,28 @@ class Machine:
         parameter or a value out of range, `TypeError` for a value of another kind.
         """
         return Machine(self._native.with_(dict(changes)))
+
+    def with_controller(self, axis: str, rst: _native.Rst, *, allow_unstable: bool = False) -> Machine:
+        """Returns a copy whose axis has a position controller in RST form, as of `design.gpc` or `design.rst`.
+
+        Raises `ValueError` for an unknown axis, and for a loop that is unstable on the prediction model of the axis,
+        unless `allow_unstable`.
+        """
+        if axis not in self.axes:
+            raise ValueError(f"axis {axis!r} is unknown; known are {', '.join(self.axes)}")
+        if not isinstance(rst, _native.Rst):
+            raise TypeError(
+                f"rst is of type {type(rst).__name__}; it must be an Rst, as design.rst(r, s, t) returns it"
+            )
+        values: dict[str, Parameter] = {
+            "controller": "rst",
+            "allow_unstable": allow_unstable,
+            "rst.r": rst.r,
+            "rst.s": rst.s,
+            "rst.t": rst.t,
+            "rst.t_first": rst.t_first,
+        }
+        return self.with_({f"{axis}.position_loop.{name}": value for name, value in values.items()})
 
     def to_yaml(self) -> str:
         """Returns the text of a machine file with these parameters."""
@@ -119,19 +151,26 @@ class Machine:
         self,
         psec: Setpoints,
         *,
-        signals: Sequence[str] = SIGNALS,
+        loads: Loads | None = None,
+        signals: Sequence[str] | None = None,
         every_tick: bool = False,
         figures: str = "all",
     ) -> Run:
         """Simulates setpoints until the axes have settled and returns signals and figures.
 
-        `psec` is an array (setpoints, axes) of position setpoints, m or rad, one row per position cycle; or a
-        dictionary of equally long columns by axis name, where the other axes stand at 0; or a scenario or a part
-        program. The machine starts at rest at the first row. After the last row the setpoints hold for 1 s, so that
-        the arrays of the run are longer than `psec`.
+        `psec` is an array (setpoints, axes) of position setpoints, m or rad, one row per position cycle; or a table
+        with equally long columns by axis name, where the other axes stand at 0: a dictionary, or a DataFrame of pandas
+        or polars, a table of PyArrow, a structured array, or a dataset of xarray; or a scenario or a part program. A
+        table with a column, index or coordinate `time` (s) is interpolated at the position cycles, as
+        `virtual_axes run` does with CSV. The machine starts at rest at the first row. After the last row the setpoints
+        hold for 1 s, so that the arrays of the run are longer than `psec`.
 
-        `signals` are those of `SIGNALS` to record, at every position cycle, or with `every_tick` at every current
-        cycle. `figures` is `all`, `contour` (all but circles) or `axes`, which is the fastest.
+        `loads` are external forces and torques on the axes, N or N·m, positive towards plus: an array or table with a
+        row per position cycle, of which the last one holds, or one value for each axis; axes without one have no load.
+
+        `signals` are those of `SIGNALS` and `TOOL_SIGNALS` to record, by default all, at every position cycle, or with
+        `every_tick` at every current cycle. `figures` is `all`, `contour` (all but circles) or `axes`, which is the
+        fastest and has no signals of the tool.
 
         Raises `ValueError` for setpoints of another shape or that the machine rejects, with time, axis and limit;
         `TypeError` for anything but real numbers.
@@ -139,8 +178,33 @@ class Machine:
         given = self.setpoints(psec)
         if isinstance(signals, str):
             raise TypeError(f"signals is {signals!r}; it must be a list of names")
-        table, text, count = self._native.simulate(given, list(signals), every_tick, figures)
-        return Run(self, table.pop("time"), table, json.loads(text), count, given)
+        chosen = list(SIGNALS + TOOL_SIGNALS if signals is None else signals)
+        of_tool = [name for name in chosen if name in TOOL_SIGNALS]
+        if of_tool and signals is not None and figures == "axes":
+            raise ValueError(f"signal {of_tool[0]!r} needs contour errors; figures must be 'all' or 'contour'")
+        forces = None if loads is None else self._loads(loads)
+        options = {
+            "signals": [name for name in chosen if name not in TOOL_SIGNALS],
+            "tool": bool(of_tool),
+            "every_tick": every_tick,
+            "figures": figures,
+        }
+        table, tool, text, count = self._native.simulate(given, forces, options)
+        time = table.pop("time")
+        tool = {name: values for name, values in tool.items() if name in of_tool}
+        return Run(self, time, table, json.loads(text), count, given, tool, forces)
+
+    def _loads(self, loads: Loads) -> NDArray[np.float64]:
+        """Returns loads as rows of all axes, N or N·m."""
+        if isinstance(loads, Mapping):
+            return np.atleast_2d(axis_values(self.axes, "loads", loads, 0.0))
+        columns = axis_columns(self, "loads", loads)
+        if columns is None:
+            return np.atleast_2d(to_floats("loads", loads))
+        if TIME in columns:
+            raise ValueError("loads has a column time; it needs a row per position cycle, without times")
+        none = np.zeros(len(next(iter(columns.values()))))
+        return np.column_stack([columns.get(axis, none) for axis in self.axes])
 
     def setpoints(self, psec: Setpoints) -> NDArray[np.float64] | _native.Scenario | _native.PartProgram:
         """Returns setpoints as an array (setpoints, axes), m or rad; scenarios and part programs as they are.
@@ -150,23 +214,15 @@ class Machine:
         """
         if isinstance(psec, _native.Scenario | _native.PartProgram):
             return psec
-        if not isinstance(psec, Mapping):
-            if isinstance(psec, str):
-                raise TypeError(
-                    f"psec is {psec!r}; a scenario is scenario(name), a part program nc_program(name_or_path)"
-                )
+        if isinstance(psec, str | os.PathLike):
+            raise TypeError(f"psec is {psec!r}; a scenario is scenario(name), a part program nc_program(name_or_path)")
+        columns = axis_columns(self, "psec", psec)
+        if columns is None:
             return self._checked(to_floats("psec", psec))
-        unknown = [name for name in psec if name not in self.axes]
-        if unknown:
-            raise ValueError(f"axis {unknown[0]!r} is unknown; known are {', '.join(self.axes)}")
-        columns = {name: to_floats(f"psec of {name}", values) for name, values in psec.items()}
-        shapes = {column.shape for column in columns.values()}
-        if not columns:
-            raise ValueError(f"psec has no columns; it needs one or more of {', '.join(self.axes)}")
-        if len(shapes) != 1 or len(next(iter(shapes))) != 1:
-            found = ", ".join(f"{name} {column.shape}" for name, column in columns.items())
-            raise ValueError(f"the columns of psec have the shapes {found}; they need one common length")
-        still = np.zeros(next(iter(shapes)))
+        if TIME in columns:
+            names = [TIME, *(axis for axis in self.axes if axis in columns)]
+            return self._native.setpoints_over_time(names, [np.ascontiguousarray(columns[name]) for name in names])
+        still = np.zeros(len(next(iter(columns.values()))))
         return self._checked(np.column_stack([columns.get(name, still) for name in self.axes]))
 
     def _checked(self, psec: NDArray[np.float64]) -> NDArray[np.float64]:

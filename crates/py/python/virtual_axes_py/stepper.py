@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,13 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from . import _native
 from .arguments import to_native, to_whole
 from .machine import Machine
+from .tables import axis_values
 
 
 class Stepper:
     """Simulation of one machine, or of several equal ones at once, stepped by position cycles.
 
-    Arrays have the shape (axes,) for one machine and (machines, axes) for several. Several machines are lanes of vector
-    instructions and cost far less than as many steppers.
+    Arrays have the shape (axes,) for one machine and (machines, axes) for several; a dictionary or Series by axis name
+    may be in their place. Several machines are lanes of vector instructions and cost far less than as many steppers.
 
     >>> stepper = Stepper(Machine.load())
     >>> for _ in range(200):
@@ -25,21 +26,32 @@ class Stepper:
     np.True_
     """
 
-    __slots__ = ("_native",)
+    __slots__ = ("_axes", "_native")
 
-    def __init__(self, machine: Machine, machines: int = 1) -> None:
-        """Creates machines at rest at home, 0 on every axis; raises `ValueError` unless there are 1 to 100,000."""
-        self._native = _native.Stepper(to_native(machine), to_whole("machines", machines, 1, 100_000))
+    def __init__(self, machine: Machine | Sequence[Machine], machines: int | None = None) -> None:
+        """Creates machines at rest at home, 0 on every axis: equal ones, 1 by default, or those of a sequence.
 
-    @classmethod
-    def _of_native(cls, native: _native.Stepper) -> Stepper:
-        stepper = cls.__new__(cls)
-        stepper._native = native
-        return stepper
+        Raises `ValueError` unless there are 1 to 100,000, and for machines with other axes or periods.
+        """
+        several = [machine] if isinstance(machine, Machine) or not isinstance(machine, Sequence) else list(machine)
+        if machines is not None and len(several) != 1:
+            raise ValueError(f"machines {machines}: a sequence of machines has its own number, {len(several)}")
+        count = 1 if machines is None else to_whole("machines", machines, 1, 100_000)
+        natives = [to_native(one) for one in several]
+        self._native = _native.Stepper(natives * count if len(natives) == 1 else natives)
+        self._axes = natives[0].axes
 
-    def __reduce__(self) -> tuple[Callable[[_native.Stepper], Stepper], tuple[_native.Stepper]]:
-        """Pickles machine and state: the copy goes on with the same bits."""
-        return Stepper._of_native, (self._native,)
+    def __getstate__(self) -> tuple[_native.Stepper, list[str]]:
+        """Pickles machines and state: the copy goes on with the same bits."""
+        return self._native, self._axes
+
+    def __setstate__(self, state: tuple[_native.Stepper, list[str]]) -> None:
+        """Restores machines and state."""
+        self._native, self._axes = state
+
+    def __repr__(self) -> str:
+        """Returns axes, number of machines and time."""
+        return f"Stepper(axes {', '.join(self._axes)}; {self.machines} machines; {self.time:.6g} s)"
 
     def step(self, psec: ArrayLike, preview: ArrayLike | None = None) -> NDArray[np.float64]:
         """Advances by one position cycle and returns the positions at its end, m or rad.
@@ -49,7 +61,7 @@ class Stepper:
         Raises `ValueError` for another shape or a value beyond ±10⁶.
         """
         ahead = None if preview is None else np.asarray(preview, dtype=np.float64)
-        return self._native.step(np.asarray(psec, dtype=np.float64), ahead)
+        return self._native.step(axis_values(self._axes, "psec", psec), ahead)
 
     def reset(self, position: ArrayLike | None = None, *, only: Sequence[int] | None = None) -> None:
         """Puts the axes at rest at `position`, m or rad (default 0), at time 0.
@@ -57,13 +69,13 @@ class Stepper:
         `only` are the indices of the machines to reset, at their rows of `position`; the time goes on then. Raises
         `ValueError` for an array of another shape or an index out of range.
         """
-        given = None if position is None else np.asarray(position, dtype=np.float64)
+        given = None if position is None else axis_values(self._axes, "position", position, 0.0)
         last = self.machines - 1
         self._native.reset(given, None if only is None else [to_whole("machine", one, 0, last) for one in only])
 
     def set_load(self, load: ArrayLike) -> None:
-        """Sets the external loads from the next cycle on, N or N·m, positive towards plus."""
-        self._native.set_load(np.asarray(load, dtype=np.float64))
+        """Sets the external loads from the next cycle on, N or N·m, positive towards plus; 0 for axes without one."""
+        self._native.set_load(axis_values(self._axes, "load", load, 0.0))
 
     def set_velocity_offset(self, offset: ArrayLike) -> None:
         """Sets offsets that are added to the outputs Ω* of the position controllers from the next cycle on.
@@ -71,14 +83,21 @@ class Stepper:
         They are in rad/s of the motor (m/s of a linear motor) and 0 after a reset. The controllers see the sum, within
         the speed limit, as their last output.
         """
-        self._native.set_velocity_offset(np.asarray(offset, dtype=np.float64))
+        self._native.set_velocity_offset(axis_values(self._axes, "offset", offset, 0.0))
 
-    def set_machine(self, machine: Machine) -> None:
+    def set_machine(self, machine: Machine, *, only: Sequence[int] | None = None) -> None:
         """Changes gains, weights, delays or plant parameters and keeps the state (bumpless transfer).
 
-        Raises `ValueError` for a machine with other periods or another number of axes.
+        `only` are the indices of the machines to change, by default all. Raises `ValueError` for a machine with other
+        periods or other axes, or an index out of range.
         """
-        self._native.set_machine(to_native(machine))
+        last = self.machines - 1
+        chosen = range(self.machines) if only is None else [to_whole("machine", one, 0, last) for one in only]
+        self._set_machines([machine] * len(chosen), chosen)
+
+    def _set_machines(self, machines: Sequence[Machine], only: Sequence[int]) -> None:
+        """Gives each of the machines `only` other parameters."""
+        self._native.set_machines([to_native(one) for one in machines], list(only))
 
     def save(self) -> _native.StepperState:
         """Returns a copy of the state for `restore`; it can be pickled."""

@@ -41,6 +41,13 @@ LARGEST_BOUND = 1e18
 """Largest amount of a bound of drawn parameters."""
 
 
+def draw(random: np.random.Generator, low: float, high: float) -> float:
+    """Draws a number uniformly; between two integers, an integer."""
+    if isinstance(low, int | np.integer) and isinstance(high, int | np.integer):
+        return int(random.integers(low, high, endpoint=True))
+    return float(random.uniform(low, high))
+
+
 class SweepResults(Sequence[SweepResult]):
     """Results of a sweep, in the order of its variants."""
 
@@ -59,6 +66,11 @@ class SweepResults(Sequence[SweepResult]):
     def __iter__(self) -> Iterator[SweepResult]:
         """Iterates over the results."""
         return iter(self._results)
+
+    def __repr__(self) -> str:
+        """Returns the numbers of variants and of failures."""
+        failed = sum(one.error is not None for one in self._results)
+        return f"SweepResults({len(self)} variants, {failed} failed)"
 
     def to_pandas(self) -> pandas.DataFrame:
         """Returns a row per variant: parameters, figures as `axes.x.peak_current_a`, `error` (needs pandas)."""
@@ -94,12 +106,7 @@ class RandomVariants(Sequence[Mapping[str, "Parameter"]]):
         position = range(self.first, self.end)[index]
         random = np.random.default_rng([self.seed, position])
 
-        def draw(low: float, high: float) -> float:
-            if isinstance(low, int | np.integer) and isinstance(high, int | np.integer):
-                return int(random.integers(low, high, endpoint=True))
-            return float(random.uniform(low, high))
-
-        return {name: draw(*bounds) for name, bounds in self.bounds.items()}
+        return {name: draw(random, *bounds) for name, bounds in self.bounds.items()}
 
 
 def random_variants(seed: int, n: int, bounds: Mapping[str, tuple[float, float]]) -> RandomVariants:

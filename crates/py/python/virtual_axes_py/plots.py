@@ -1,0 +1,153 @@
+"""Plots of runs and of frequency responses (needs matplotlib)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from .design import FrequencyResponse
+    from .run import Run
+
+UNITS = {"m": ("mm", 1e3, "µm", 1e6), "rad": ("°", np.degrees(1), "m°", np.degrees(1e3))}
+"""Unit and factor of positions and of errors, by the unit of an axis."""
+
+
+def _panels(titles: Sequence[str], given: Iterable[Axes] | None, shared: bool = True) -> list[Axes]:
+    """Returns the axes of matplotlib for panels below each other: those given, or those of a new figure."""
+    if given is None:
+        figure = _figure((9, 1 + 2.2 * len(titles)))
+        return [*np.atleast_1d(figure.subplots(len(titles), 1, sharex=shared))]
+    panels = list(given) if isinstance(given, Iterable) else [given]
+    if len(panels) != len(titles):
+        raise ValueError(f"ax has {len(panels)} axes of matplotlib; {len(titles)} are drawn: {'; '.join(titles)}")
+    return panels
+
+
+def _figure(size: tuple[float, float]) -> Figure:
+    """Creates a figure of pyplot; in a notebook one that is shown once, as the value of its cell."""
+    try:
+        import matplotlib
+        from matplotlib import pyplot
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise ImportError("plots need matplotlib: pip install 'virtual_axes_py[plot]'") from error
+    if "inline" in str(matplotlib.get_backend()).lower():
+        return Figure(figsize=size, layout="constrained")
+    return pyplot.figure(figsize=size, layout="constrained")
+
+
+def _figure_of(ax: Axes) -> Figure:
+    """Returns the figure of axes of matplotlib."""
+    figure: Any = ax.get_figure()
+    return figure  # type: ignore[no-any-return]
+
+
+def plot(run: Run, axes: Sequence[str] | None, ax: Iterable[Axes] | None) -> Figure:
+    """Draws a run over time, as `Run.plot` documents."""
+    units = dict(zip(run.machine.axes, run.machine.units))
+    moving = [name for name in run.machine.axes if run.figures["axes"][name]["moves"]]
+    names = moving if axes is None else [axes] if isinstance(axes, str) else list(axes)
+    signals = {name: run.axis(name) for name in names}
+    missing = [name for name in ("psec", "position", "current") if name not in run.signals]
+    if missing:
+        raise ValueError(f"signal {missing[0]!r} is not recorded; recorded are {', '.join(run.signals)}")
+    kinds = [unit for unit in UNITS if unit in {units[name] for name in names}]
+    titles = [
+        f"{what}, {UNITS[unit][place]}"
+        for unit in kinds
+        for what, place in (("setpoint and position", 0), ("following error", 2))
+    ]
+    panels = _panels([*titles, "motor current, A"], ax)
+    for name in names:
+        place, (_, length, _, small) = 2 * kinds.index(units[name]), UNITS[units[name]]
+        one = signals[name]
+        (line,) = panels[place].plot(run.time, one["position"] * length, label=f"{name} position")
+        color = line.get_color()
+        panels[place].plot(run.time, one["psec"] * length, "--", color=color, label=f"{name} setpoint")
+        panels[place + 1].plot(run.time, (one["psec"] - one["position"]) * small, color=color, label=name)
+        panels[-1].plot(run.time, one["current"], color=color, label=name)
+    for panel, title in zip(panels, [*titles, "motor current, A"]):
+        panel.set_ylabel(title)
+        panel.grid(alpha=0.3)
+        if names:
+            panel.legend(loc="upper right", fontsize="small")
+    panels[-1].set_xlabel("time, s")
+    return _figure_of(panels[0])
+
+
+def plot_path(run: Run, plane: str | None, ax: Axes | None) -> Figure:
+    """Draws the path of the tool tip, as `Run.plot_path` documents."""
+    missing = [name for name in ("tool_path", "tool_setpoint", "contour_error") if name not in run.tool]
+    if missing:
+        raise ValueError(f"signal {missing[0]!r} of the tool is not recorded; it needs figures 'all' or 'contour'")
+    setpoint, path = run.tool_setpoint * 1e3, run.tool_path * 1e3
+    if plane is None:
+        longest = sorted(range(3), key=lambda index: (-round(float(np.ptp(setpoint[:, index])), 9), index))[:2]
+        plane = "".join("xyz"[index] for index in sorted(longest))
+    if plane not in ("xy", "yz", "xz"):
+        raise ValueError(f"plane {plane!r}: must be xy, yz or xz")
+    columns = ["xyz".index(axis) for axis in plane]
+    panel = _figure((7, 6)).add_subplot() if ax is None else ax
+    from matplotlib.collections import LineCollection
+
+    panel.plot(*setpoint[:, columns].T, "--", color="0.6", linewidth=1, label="setpoint")
+    points = path[:, columns]
+    # A segment per cycle with the error at its end.
+    segments = np.stack([points[:-1], points[1:]], axis=1)
+    lines = LineCollection(list(segments), cmap="viridis", linewidth=2, label="tool tip")
+    lines.set_array(run.contour_error[1:] * 1e6)
+    panel.add_collection(lines)
+    panel.autoscale_view()
+    panel.set_aspect("equal", adjustable="datalim")
+    panel.set_xlabel(f"{plane[0].upper()}, mm")
+    panel.set_ylabel(f"{plane[1].upper()}, mm")
+    panel.grid(alpha=0.3)
+    figure = _figure_of(panel)
+    figure.colorbar(lines, ax=panel, label="contour error, µm")
+    return figure
+
+
+def plot_polar(run: Run, ax: Axes | None) -> Figure:
+    """Draws the circles of a run, as `Run.plot_polar` documents."""
+    circles = [circle for circle in run.circles() if len(circle.angle)]
+    if not circles:
+        raise ValueError("the motion has no circle at constant feed; scenario('ballbar') has two")
+    if ax is not None and ax.name != "polar":
+        raise ValueError(f"ax has the projection {ax.name!r}; it must be polar: plt.subplot(projection='polar')")
+    panel: Any = _figure((7, 7)).add_subplot(projection="polar") if ax is None else ax
+    low, high = 0.0, 0.0
+    for circle in circles:
+        way = "counterclockwise" if circle.counterclockwise else "clockwise"
+        label = f"{''.join(circle.plane).upper()} {circle.radius * 1e3:.6g} mm, {way}"
+        panel.plot(circle.angle, circle.deviation * 1e6, linewidth=1, label=label)
+        low, high = min(low, float(circle.deviation.min()) * 1e6), max(high, float(circle.deviation.max()) * 1e6)
+    span = max(high - low, 1e-3)
+    panel.plot(np.linspace(0, 2 * np.pi, 361), np.zeros(361), "--", color="0.6", linewidth=1, label="nominal")
+    panel.set_rlim(low - 0.1 * span, high + 0.1 * span)
+    panel.set_rorigin(low - 2 * span)
+    panel.set_title("radial deviation, µm")
+    panel.legend(loc="lower right", fontsize="small")
+    return _figure_of(panel)
+
+
+def plot_bode(responses: Mapping[str, FrequencyResponse], ax: Iterable[Axes] | None) -> Figure:
+    """Draws frequency responses by their labels: magnitude and phase of the open and the closed loops."""
+    magnitude, phase = _panels(["magnitude, dB", "phase, °"], ax)
+    for label, one in responses.items():
+        (line,) = magnitude.semilogx(one.frequency_hz, one.closed_db, label=f"{label} closed")
+        color = line.get_color()
+        magnitude.semilogx(one.frequency_hz, one.open_db, "--", color=color, label=f"{label} open")
+        phase.semilogx(one.frequency_hz, one.closed_deg, color=color, label=f"{label} closed")
+        phase.semilogx(one.frequency_hz, one.open_deg, "--", color=color, label=f"{label} open")
+    for panel, title in ((magnitude, "magnitude, dB"), (phase, "phase, °")):
+        panel.set_ylabel(title)
+        panel.grid(alpha=0.3, which="both")
+    magnitude.legend(loc="lower left", fontsize="small")
+    phase.set_xlabel("frequency, Hz")
+    return _figure_of(magnitude)

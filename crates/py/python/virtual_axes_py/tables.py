@@ -1,0 +1,141 @@
+"""Tables of pandas, polars, PyArrow, xarray and NumPy, and dictionaries, as arrays by column name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arguments import to_floats
+
+if TYPE_CHECKING:
+    from .machine import Machine
+
+TIME = "time"
+"""Name of the column of times, s."""
+
+
+class Table(Protocol):
+    """Table with named columns: a DataFrame of pandas or polars, or a dataset of xarray."""
+
+    def __getitem__(self, key: Any, /) -> Any:
+        """Returns a column."""
+
+    def __len__(self) -> int:
+        """Returns the number of rows or columns."""
+
+
+def columns_of(name: str, given: Any) -> dict[str, NDArray[np.float64]] | None:
+    """Returns the columns of a table by name; None for anything without names, as an array.
+
+    The columns are those of a DataFrame of pandas or polars, of a table of PyArrow, of a structured array of NumPy, of
+    a dictionary, or the variables of a dataset of xarray. A DataArray with two dimensions has a column for each label
+    of the one with texts. A named index or coordinate is a column too. Durations and dates become seconds, dates
+    from the first one.
+
+    Raises `ValueError` for columns of different lengths or with one name, `TypeError` for anything but numbers.
+    """
+    pairs = _pairs(given)
+    if pairs is None:
+        return None
+    found: dict[str, NDArray[np.float64]] = {}
+    for label, values in pairs:
+        title = str(label)
+        if title in found:
+            raise ValueError(f"{name} has two columns {title!r}; names must differ")
+        found[title] = _numbers(f"{name} of {title}", values)
+    shapes = {column.shape for column in found.values()}
+    if found and (len(shapes) != 1 or len(next(iter(shapes))) != 1):
+        listed = ", ".join(f"{title} {column.shape}" for title, column in found.items())
+        raise ValueError(f"the columns of {name} have the shapes {listed}; they need one common length")
+    return found
+
+
+def _pairs(given: Any) -> Iterable[tuple[Any, Any]] | None:
+    """Returns labels and values of the columns of a table, None for anything else."""
+    if isinstance(given, np.ndarray):
+        return None if given.dtype.names is None else [(label, given[label]) for label in given.dtype.names]
+    if hasattr(given, "data_vars"):
+        shared = [(label, values) for label, values in given.coords.items() if values.ndim == 1]
+        return [*shared, *given.data_vars.items()]
+    if hasattr(given, "to_dataset") and hasattr(given, "dims"):
+        texts = [dim for dim in given.dims if dim in given.coords and given.coords[dim].dtype.kind in "UOT"]
+        return _pairs(given.to_dataset(dim=texts[0]).reset_coords(drop=True)) if len(texts) == 1 else None
+    if isinstance(given, Mapping):
+        return given.items()
+    if hasattr(given, "iloc") and hasattr(given, "columns"):
+        return _of_pandas(given)
+    if hasattr(given, "get_columns") and hasattr(given, "columns"):
+        return [(column.name, column) for column in given.get_columns()]
+    if hasattr(given, "column_names") and hasattr(given, "columns"):
+        return list(zip(given.column_names, given.columns))
+    return None
+
+
+def _of_pandas(table: Any) -> list[tuple[Any, Any]] | None:
+    """Returns the columns of a DataFrame; None for one without names, whose labels are 0, 1, …"""
+    index = table.index
+    named = [(name, index.get_level_values(level)) for level, name in enumerate(index.names) if name is not None]
+    if not named and index.dtype.kind in "mM":
+        named = [(TIME, index)]
+    if not named and list(table.columns) == list(range(table.shape[1])):
+        return None
+    return named + [(label, table.iloc[:, position]) for position, label in enumerate(table.columns)]
+
+
+def _numbers(name: str, values: Any) -> NDArray[np.float64]:
+    """Returns the values of a column; durations and dates in s, missing values as NaN."""
+    if hasattr(values, "iloc") and not isinstance(values.dtype, np.dtype) and values.dtype.kind in tuple("biuf"):
+        # A column of pandas that may have missing values.
+        values = values.to_numpy(dtype=np.float64, na_value=np.nan)
+    if not hasattr(values, "dtype"):
+        return to_floats(name, values)
+    array = np.asarray(values)
+    if array.dtype.kind == "M":
+        array = array - array[:1]
+    if array.dtype.kind == "m":
+        return np.asarray(array / np.timedelta64(1, "ns") * 1e-9, dtype=np.float64)
+    return to_floats(name, array)
+
+
+def axis_columns(machine: Machine, name: str, given: Any) -> dict[str, NDArray[np.float64]] | None:
+    """Returns the columns of a table by axis, and of the time if it has one; None for anything without names.
+
+    Raises `ValueError` for a column that is neither, naming it.
+    """
+    found = columns_of(name, given)
+    if found is None:
+        return None
+    axes = machine.axes
+    unknown = [title for title in found if title not in axes and title != TIME]
+    if unknown:
+        raise ValueError(f"{name}: axis {unknown[0]!r} is unknown; known are {', '.join(axes)}, and {TIME} (s)")
+    if not any(title in axes for title in found):
+        raise ValueError(f"{name} has no columns; it needs one or more of {', '.join(axes)}")
+    return found
+
+
+def axis_values(axes: list[str], name: str, given: Any, missing: float | None = None) -> NDArray[np.float64]:
+    """Returns values of the axes as an array: of one machine (axes,), of several (machines, axes).
+
+    A dictionary or Series has one value for each axis by name, or one for each machine; `missing` is the value of those
+    that it does not have, which are an error if that is None.
+    """
+    if isinstance(given, np.ndarray):
+        return np.asarray(given, dtype=np.float64)
+    is_series = hasattr(given, "index") and hasattr(given, "items")
+    if not (isinstance(given, Mapping) or is_series):
+        return np.asarray(given, dtype=np.float64)
+    values = {str(label): value for label, value in given.items()}
+    if is_series and list(given.index) == list(range(len(given.index))):
+        return np.asarray(given, dtype=np.float64)
+    unknown = [label for label in values if label not in axes]
+    if unknown:
+        raise ValueError(f"{name}: axis {unknown[0]!r} is unknown; known are {', '.join(axes)}")
+    absent = [axis for axis in axes if axis not in values]
+    if absent and missing is None:
+        raise ValueError(f"{name} has no value for {absent[0]}; it needs one for each of {', '.join(axes)}")
+    columns = [to_floats(f"{name} of {axis}", values.get(axis, missing)) for axis in axes]
+    return np.stack(np.broadcast_arrays(*columns), axis=-1)

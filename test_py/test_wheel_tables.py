@@ -1,0 +1,265 @@
+"""Module `virtual_axes_py`: tables with named columns, loads, signals of the tool, times of errors, paths and types."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pytest
+
+import virtual_axes_py as va
+from node_process import node_binary
+
+COMMAND = str(Path(node_binary()).with_name("virtual_axes"))
+COUNT = 100
+X, Y = np.linspace(0, 0.01, COUNT), np.linspace(0, -0.005, COUNT)
+TIMES = 0.006 * np.arange(COUNT)
+
+
+@pytest.fixture(scope="module")
+def machine() -> va.Machine:
+    """Returns the default machine."""
+    return va.Machine.load()
+
+
+class Column:
+    """Column of a stand-in for polars: values without the interface of NumPy but its conversion."""
+
+    def __init__(self, name: str, values: np.ndarray) -> None:
+        """Stores name and values."""
+        self.name, self._values = name, values
+        self.dtype = "Float64"
+
+    def __array__(self, dtype: object = None, copy: object = None) -> np.ndarray:
+        """Returns the values."""
+        return self._values
+
+
+class ColumnFrame:
+    """Stand-in for a DataFrame of polars, with the names that are used."""
+
+    def __init__(self, columns: dict[str, np.ndarray]) -> None:
+        """Stores the columns."""
+        self.columns, self._columns = list(columns), columns
+
+    def get_columns(self) -> list[Column]:
+        """Returns the columns."""
+        return [Column(name, values) for name, values in self._columns.items()]
+
+
+TABLES = {
+    "dictionary": {"y": Y, "x": X},
+    "pandas": pd.DataFrame({"a": 0 * X, "y": Y, "x": X}),
+    "pandas, nullable": pd.DataFrame({"y": Y, "x": X}).convert_dtypes(),
+    "pandas, time as index": pd.DataFrame({"y": Y, "x": X}, index=pd.Index(TIMES, name="time")),
+    "pandas, durations": pd.DataFrame({"y": Y, "x": X}, index=pd.to_timedelta(6 * np.arange(COUNT), unit="ms")),
+    "pandas, time as column": pd.DataFrame({"y": Y, "time": TIMES, "x": X}),
+    "pandas, axis as index": pd.DataFrame({"x": X}, index=pd.Index(Y, name="y")),
+    "PyArrow": pa.table({"y": Y, "x": X}),
+    "structured array": np.rec.fromarrays([Y, X], names="y,x"),
+    "polars": ColumnFrame({"y": Y, "x": X}),
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_columns_of_a_table_are_matched_by_name(name: str, machine: va.Machine) -> None:
+    psec = np.zeros((COUNT, 5))
+    psec[:, 0], psec[:, 1] = X, Y
+    found = machine.simulate(TABLES[name])
+    assert np.array_equal(found.position, machine.simulate(psec).position)
+    assert found.position[-1] == pytest.approx([0.01, -0.005, 0, 0, 0], abs=1e-6)
+
+
+def test_columns_of_real_polars_and_xarray_are_matched_by_name(machine: va.Machine) -> None:
+    polars, xarray = pytest.importorskip("polars"), pytest.importorskip("xarray")
+    expected = machine.simulate({"x": X, "y": Y}).position
+    tables = [
+        polars.DataFrame({"y": Y, "x": X}),
+        polars.DataFrame({"y": Y, "time": TIMES, "x": X}),
+        xarray.Dataset({"y": ("time", Y), "x": ("time", X)}, coords={"time": TIMES}),
+        xarray.DataArray(np.column_stack([Y, X]), dims=("k", "axis"), coords={"axis": ["y", "x"]}),
+    ]
+    for table in tables:
+        assert np.array_equal(machine.simulate(table).position, expected)
+
+
+def test_a_table_with_times_is_interpolated_as_by_the_command(machine: va.Machine, tmp_path: Path) -> None:
+    table = pd.DataFrame({"time": 0.7 * TIMES, "y": Y, "x": X})
+    table.to_csv(tmp_path / "psec.csv", index=False)
+    done = subprocess.run([COMMAND, "run", tmp_path / "psec.csv", "--json"], capture_output=True, text=True, timeout=60)
+    expected = json.loads(done.stdout)["runs"][0]
+    run = machine.simulate(table)
+    assert run.figures == {key: expected[key] for key in run.figures}
+
+
+@pytest.mark.parametrize(
+    ("table", "text"),
+    [
+        (pd.DataFrame({"x": X, "w": X}), "psec: axis 'w' is unknown; known are x, y, z, a, c, and time"),
+        ({"X": X}, "axis 'X' is unknown"),
+        (pd.DataFrame({"x": X}, index=pd.Index(X, name="z1")), "axis 'z1' is unknown"),
+        (pd.DataFrame(np.column_stack([X, Y]), columns=["x", "x"]), "two columns 'x'"),
+        (pd.DataFrame({"time": TIMES[::-1], "x": X}), "time"),
+        (pd.DataFrame({"time": TIMES}), "psec has no columns; it needs one or more of x"),
+        (pd.DataFrame(np.zeros((3, 4))), "psec has 4 columns"),
+    ],
+)
+def test_an_unknown_column_is_refused(table: object, text: str, machine: va.Machine) -> None:
+    with pytest.raises(ValueError, match=text):
+        machine.simulate(table)
+
+
+def test_a_stepper_takes_values_by_axis_name(machine: va.Machine) -> None:
+    one, other = va.Stepper(machine), va.Stepper(machine)
+    one.set_load({"x": 500.0})
+    other.set_load([500.0, 0, 0, 0, 0])
+    for row in va.scenario("corner-90").psec(machine)[:50]:
+        by_name = pd.Series(dict(zip(machine.axes, row)))[::-1]
+        assert np.array_equal(one.step(by_name), other.step(row))
+    with pytest.raises(ValueError, match="psec has no value for y"):
+        one.step({"x": 0.0})
+
+
+def test_loads_have_the_bits_of_a_stepper_and_their_current(machine: va.Machine) -> None:
+    psec = va.scenario("corner-90").psec(machine)
+    loads = np.zeros((len(psec), 5))
+    loads[:, 0] = 400 * np.sin(np.arange(len(psec)) / 20)
+    run = machine.simulate(psec, loads=pd.DataFrame({"x": loads[:, 0]}))
+    stepper = va.Stepper(machine)
+    stepper.reset(psec[0])
+    for cycle in range(len(psec) - 1):
+        stepper.set_load(loads[cycle])
+        assert np.array_equal(stepper.step(psec[cycle]), run.position[cycle + 1])
+    constant = machine.simulate(psec, loads={"x": 500.0})
+    parameters = machine.parameters
+    # The torque F·p/(2π) of the screw over the torque constant.
+    radius = parameters["x.transmission.screw_lead_mm"] * 1e-3 / (2 * np.pi)
+    expected = -500 * radius / parameters["x.motor.torque_constant_nm_a"]
+    assert constant.load_current[5:, 0] == pytest.approx(expected, rel=1e-9)
+    assert not constant.load_current[:, 1].any()
+    with pytest.raises(ValueError, match="loads: axis 'w' is unknown"):
+        machine.simulate(psec, loads={"w": 1.0})
+    with pytest.raises(ValueError, match="loads: row 0 of x is"):
+        machine.simulate(psec, loads={"x": np.inf})
+
+
+@pytest.mark.parametrize("every_tick", [False, True])
+def test_signals_of_the_tool_have_the_figures(every_tick: bool, machine: va.Machine) -> None:
+    run = machine.simulate(va.scenario("five-axis"), every_tick=every_tick)
+    assert 1e6 * run.contour_error.max() == run.figures["contour_error_um"]["max"]
+    errors = run.figures["orientation_error_mdeg"]
+    assert np.degrees(1e3 * run.orientation_error.max()) == pytest.approx(errors["max"], rel=1e-12)
+    assert run.contour_error.shape == run.feed.shape == run.time.shape
+    if every_tick:
+        squares = np.mean(np.square(run.contour_error))
+        assert 1e6 * np.sqrt(squares) == pytest.approx(run.figures["contour_error_um"]["rms"], rel=1e-9)
+
+
+def test_path_and_feed_of_the_tool_have_their_closed_form(machine: va.Machine) -> None:
+    run = machine.simulate(va.scenario("corner-90"))
+    # Without rotary motion the tip moves as the axes do.
+    start = run.tool_path[0] - run.position[0, :3]
+    assert run.tool_path == pytest.approx(run.position[:, :3] + start, abs=1e-12)
+    assert run.feed == pytest.approx(np.linalg.norm(run.velocity[:, :3], axis=1), abs=1e-9)
+    turning = machine.simulate({"c": np.linspace(0, 0.5, 2000), "x": np.full(2000, 0.1)})
+    # The tip at 0.1 m from the axis of C: v = ω r.
+    assert turning.feed[1500] == pytest.approx(0.1 * abs(turning.velocity[1500, 4]), rel=1e-6)
+    assert turning.contour_error.max() < 1e-3
+    with pytest.raises(AttributeError, match="'contour_error' of the tool is not recorded"):
+        print(machine.simulate({"x": X}, figures="axes").contour_error)
+    with pytest.raises(ValueError, match="signal 'feed' needs contour errors"):
+        machine.simulate({"x": X}, figures="axes", signals=["feed"])
+
+
+@pytest.mark.parametrize("row", [1, 50, 511, 512, 600, 999])
+def test_a_limit_error_has_the_time_of_its_setpoint(row: int, machine: va.Machine) -> None:
+    psec = np.zeros((1000, 5))
+    psec[row:, 0] = 0.2
+    with pytest.raises(ValueError, match=f"^at {row * 6 / 1000:.6g} s: x") as raised:
+        machine.simulate(psec)
+    assert ", point" not in str(raised.value) or f"x, point {row}: " in str(raised.value)
+    psec = np.zeros((1000, 5))
+    psec[row:, 1] = np.linspace(0, 1e-3 * (1000 - row), 1000 - row)
+    psec[row, 1] = 9.0
+    with pytest.raises(ValueError, match=f"^at {row * 6 / 1000:.6g} s: y"):
+        machine.simulate(psec)
+
+
+def test_a_data_frame_is_a_recording(machine: va.Machine, tmp_path: Path) -> None:
+    slow = machine.with_({"x.feedforward.velocity": 0.0, "x.feedforward.torque_kg_m2": 0.0})
+    run = slow.simulate(va.scenario("x-there-and-back"))
+    channels = {"time": run.time, **{name: run.axis("x")[name] for name in ("psec", "position", "current")}}
+    expected = va.identify(channels, "x", slow, feedforward="off").parameters
+    frame = pd.DataFrame(channels)
+    assert va.identify(frame, "x", slow, feedforward="off").parameters == expected
+    assert va.identify([frame.set_index("time")], "x", slow, feedforward="off").parameters == expected
+    named = pd.DataFrame({"t_ms": 1e3 * run.time, "y.position": run.position[:, 1]})
+    for channel, unit, factor in (("psec", "mm", 1e3), ("position", "mm", 1e3), ("current", "A", 1.0)):
+        named[f"x.{channel} [{unit}]"] = factor * channels[channel]
+    named.to_csv(tmp_path / "recording.csv", index=False)
+    by_units = va.identify(named, "x", slow, feedforward="off")
+    from_file = va.identify(tmp_path / "recording.csv", "x", slow, feedforward="off")
+    assert by_units.parameters == from_file.parameters
+    assert by_units.parameters["x.friction.a"] == pytest.approx(expected["x.friction.a"], rel=1e-3)
+
+
+def test_paths_are_accepted_and_the_version_is_that_of_the_command(machine: va.Machine, tmp_path: Path) -> None:
+    (tmp_path / "machine.yaml").write_text(machine.to_yaml())
+    assert va.Machine.load(tmp_path / "machine.yaml") == machine
+    (tmp_path / "part.nc").write_text("G21 G90 G94\nG1 X10 F1000\nM30\n")
+    assert machine.simulate(va.nc_program(tmp_path / "part.nc")).figures["axes"]["x"]["moves"]
+    root = Path(__file__).resolve().parent.parent
+    assert va.scenario(root / "config/scenarios/x-constant.yaml").name
+    done = subprocess.run([COMMAND, "--version"], capture_output=True, text=True, timeout=30)
+    assert done.stdout.split()[-1] == va.__version__ or va.__version__ in done.stdout
+    with pytest.raises(TypeError, match="name_or_path is of type int"):
+        va.Machine.load(3)
+
+
+def test_the_text_of_each_object_is_short(machine: va.Machine) -> None:
+    run = machine.simulate(va.scenario("ballbar"))
+    results = va.sweep(machine, [{"x.position_loop.gain": 2.0}], va.scenario("x-constant"))
+    response = va.design.frequency_response(machine, "x")
+    objects = [machine, run, results, results[0], response, va.Stepper(machine), va.scenario("ballbar"), *run.circles()]
+    for one in objects:
+        assert len(repr(one)) < 160 and "\n" not in repr(one) and "object at" not in repr(one), repr(one)
+    assert f"{run.figures['contour_error_um']['max']:.6g} µm" in repr(run)
+    assert {"position", "contour_error", "following_error", "plot_polar"} <= set(dir(run))
+
+
+def test_mypy_finds_wrong_names_and_nothing_else(tmp_path: Path) -> None:
+    program = """\
+import pathlib
+import numpy as np
+import pandas as pd
+import virtual_axes_py as va
+machine = va.Machine.load(pathlib.Path("machine.yaml"))
+run = machine.simulate({"x": np.zeros(3)}, loads={"x": 1.0})
+error: float = float(run.contour_error.max()) + float(run.position[0, 0])
+machine.simulate(pd.DataFrame({"x": [0.0]}))
+other = machine.with_controller("x", va.design.of_machine(machine, "x"))
+run.positon
+machine.simulat
+va.tunes
+run.figure
+"""
+    file = tmp_path / "program.py"
+    file.write_text(program)
+    command = [sys.executable, "-m", "mypy", "--ignore-missing-imports", "--no-incremental", str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    lines = [int(line.split(":")[1]) for line in done.stdout.splitlines() if ": error:" in line]
+    assert lines == [10, 11, 12, 13], done.stdout
+
+
+def test_recorded_signals_are_in_the_table(machine: va.Machine, tmp_path: Path) -> None:
+    run = machine.simulate(va.scenario("x-constant"))
+    run.to_pandas().to_csv(tmp_path / "run.csv")
+    with (tmp_path / "run.csv").open(newline="") as file:
+        header = next(csv.reader(file))
+    assert {"time", "x.position", "contour_error", "tool_path.x", "feed"} <= set(header)
