@@ -44,7 +44,7 @@ MILL = [
     "G0 Z-30\nG81 X-40 Y-30 Z-40 R-31 F600\nX-50\nG80\nG0 Z-1",
     "G64\nG1 F4000\n"
     + "\n".join(f"X-{50 + 8 * math.cos(k / 4):.4f} Y-{50 + 8 * math.sin(k / 4):.4f}" for k in range(26)),
-    "G2 X-60 Y-60 Z-12 I-10 J-10 F4000\nG1 Z-2",
+    "G1 F4000 X-50 Y-50\nG2 X-60 Y-60 Z-12 J-10\nG1 Z-2",
     "G0 X-200 Y-100 Z-50\nG0 X-10 Y-10 Z-1",
     "G93\nG1 X-30 F60\nX-35 Y-30 F90\nG94",
 ]
