@@ -52,7 +52,7 @@ typedef enum VaDriveMode {
    */
   VA_SHORT_CIRCUIT = 2,
   /**
-   * Drive off, coasting: the motor current is 0.
+   * Drive off, coasting: the motor current is controlled to 0.
    */
   VA_COAST = 3,
 } VaDriveMode;
