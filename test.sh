@@ -89,7 +89,7 @@ trap 'exit 143' TERM HUP
 
 set_up() {
   local options=
-  [ $mode = all ] && options=--browser
+  [ $mode = all ] && options="--browser --linuxcnc"
   stage "set-up and message build" tools/setup.sh $options
 }
 

@@ -4,10 +4,11 @@
 # of control_msgs that the node uses)
 # and .build/env.sh, which activates both in a shell.
 #
-#     tools/setup.sh [--demo] [--browser] && source .build/env.sh
+#     tools/setup.sh [--demo] [--browser] [--linuxcnc] && source .build/env.sh
 #
 # With --demo, only what ./demo.sh needs: rclpy, the messages of this package, and packages for figures.
-# With --browser, apt-get also installs Chromium and iptables for tests that need them, where that is possible.
+# With --browser, apt-get also installs Chromium and iptables for tests that need them, where that is possible; with
+# --linuxcnc, LinuxCNC.
 # Another run repeats only stages with changed inputs: each stage ends by writing a stamp with the
 # hash of its inputs, so an aborted stage starts again from the beginning.
 set -euo pipefail
@@ -24,13 +25,14 @@ fail() {
   exit 1
 }
 
-browser=false demo=false
+browser=false demo=false linuxcnc=false
 for argument in "$@"; do
   case $argument in
     --browser) browser=true ;;
     --demo) demo=true ;;
+    --linuxcnc) linuxcnc=true ;;
     -h | --help) sed -n '2,/^set /s/^# \{0,1\}//p' "$0" && exit ;;
-    *) fail "unknown option $argument; allowed: --demo, --browser, --help" ;;
+    *) fail "unknown option $argument; allowed: --demo, --browser, --linuxcnc, --help" ;;
   esac
 done
 
@@ -95,6 +97,13 @@ install_browser() {
 install_network_tools() {
   command -v iptables >/dev/null && command -v ip >/dev/null || try_apt iptables iproute2 ||
     echo "setup: no iptables or ip (Debian: apt-get install iptables iproute2): the tests of two hosts are skipped" >&2
+}
+
+# Installs LinuxCNC with what its components are compiled with; without it, its tests are skipped.
+install_linuxcnc() {
+  command -v linuxcnc >/dev/null && [ -e /usr/share/linuxcnc/Makefile.modinc ] ||
+    try_apt --no-install-recommends linuxcnc-uspace linuxcnc-uspace-dev ||
+    echo "setup: no LinuxCNC (Debian: apt-get install linuxcnc-uspace linuxcnc-uspace-dev): its tests are skipped" >&2
 }
 
 # Unpacks libfaketime, which sets the wall clock of the node under test; without it, those tests are skipped.
@@ -228,3 +237,4 @@ fi
 unpack_faketime
 step "virtual_axes_py into .venv" module make_module
 if $browser; then install_browser; install_network_tools; fi
+if $linuxcnc; then install_linuxcnc; fi

@@ -36,6 +36,28 @@ typedef enum VaStatus {
 } VaStatus;
 
 /**
+ * Mode of a drive.
+ */
+typedef enum VaDriveMode {
+  /**
+   * Position control: the axis follows the setpoints `psec`.
+   */
+  VA_POSITION = 0,
+  /**
+   * Velocity control: the axis follows the velocities of `va_set_velocities`; 0 is a controlled stop.
+   */
+  VA_VELOCITY = 1,
+  /**
+   * Drive off with short-circuited windings: the motor brakes by its back-EMF; the current is not limited.
+   */
+  VA_SHORT_CIRCUIT = 2,
+  /**
+   * Drive off, coasting: the motor current is controlled to 0.
+   */
+  VA_COAST = 3,
+} VaDriveMode;
+
+/**
  * Machine with its state.
  */
 typedef struct VaMachine VaMachine;
@@ -151,6 +173,21 @@ const char *va_last_error(void);
  */
 enum VaStatus va_create(const char *name,
                         struct VaMachine **machine);
+
+/**
+ * Creates a machine as `va_create` does, with changed parameters: `count` texts such as `x.position_loop.gain=2`, in the
+ * names and units of the machine file.
+ *
+ * All of them are set at once, also periods and parameters that need each other. `*machine` is null after an error.
+ *
+ * # Safety
+ * `name` is null or a text that ends with a null character, `assignments` null or a pointer to `count` of them, `machine`
+ * null or a pointer to a pointer.
+ */
+enum VaStatus va_create_with(const char *name,
+                             const char *const *assignments,
+                             size_t count,
+                             struct VaMachine **machine);
 
 /**
  * Creates a machine from the text of a machine file; `source` names it in errors.
@@ -370,6 +407,31 @@ enum VaStatus va_step_for_ns(struct VaMachine *machine,
 enum VaStatus va_set_loads(struct VaMachine *machine,
                            const double *loads,
                            size_t count);
+
+/**
+ * Sets the mode of the drive of an axis, a `VaDriveMode`, from the next position cycle on; `va_reset` returns to
+ * `VA_POSITION`.
+ *
+ * A drive that is off has no holding brake: a vertical axis falls or sinks. When it is switched on, the integrals of its
+ * controllers start from 0. The caller lets `psec` follow the position before it switches to `VA_POSITION`.
+ *
+ * # Safety
+ * `machine` is null or a machine of this library.
+ */
+enum VaStatus va_set_drive_mode(struct VaMachine *machine,
+                                size_t axis,
+                                uint32_t mode);
+
+/**
+ * Sets the velocities, m/s or rad/s within ±10⁶, one per axis, from the next position cycle on: the setpoints of axes in
+ * `VA_VELOCITY`; of axes in `VA_POSITION` they are added to the output of the position controller. `va_reset` sets 0.
+ *
+ * # Safety
+ * `machine` is null or a machine of this library, `velocities` null or a pointer to `count` numbers.
+ */
+enum VaStatus va_set_velocities(struct VaMachine *machine,
+                                const double *velocities,
+                                size_t count);
 
 /**
  * Returns the number of future setpoints that the controllers read, the largest of all axes; 0 for null.

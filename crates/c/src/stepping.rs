@@ -15,7 +15,7 @@ pub enum VaDriveMode {
     VaVelocity = 1,
     /// Drive off with short-circuited windings: the motor brakes by its back-EMF; the current is not limited.
     VaShortCircuit = 2,
-    /// Drive off, coasting: the motor current is 0.
+    /// Drive off, coasting: the motor current is controlled to 0.
     VaCoast = 3,
 }
 

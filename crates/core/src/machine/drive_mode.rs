@@ -19,7 +19,7 @@ pub enum DriveMode {
     /// Drive off with the windings short-circuited: the voltage is 0 and the motor brakes by its back-EMF. The current is
     /// not limited.
     ShortCircuit,
-    /// Drive off, coasting: the current loop holds the motor current at 0.
+    /// Drive off, coasting: the current loop controls the motor current to 0.
     Coast,
 }
 

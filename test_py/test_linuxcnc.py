@@ -1,0 +1,246 @@
+"""LinuxCNC with the HAL component `virtual_axes`: feedback with the bits of `run`, following-error trips."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import re
+import shutil
+import signal
+import subprocess
+import tempfile
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).parents[1]
+TARGET = Path(os.environ.get("CARGO_TARGET_DIR", CHECKOUT / "target")) / "release"
+COMMAND, LIBRARY = TARGET / "virtual_axes", TARGET / "libvirtual_axes_c.a"
+MODULES = Path("/usr/lib/linuxcnc/modules")
+SESSION_S = 180
+ATTEMPTS = 3
+
+
+def reason_to_skip() -> str | None:
+    """Returns what is missing for LinuxCNC with a component of our own, or `None`."""
+    if not shutil.which("linuxcnc") or not Path("/usr/share/linuxcnc/Makefile.modinc").exists():
+        return "LinuxCNC is not installed (tools/setup.sh --linuxcnc)"
+    if not os.access(MODULES, os.W_OK):
+        return f"{MODULES} is not writable"
+    return None if LIBRARY.exists() else f"{LIBRARY} is missing (cargo build --release -p virtual_axes_c)"
+
+
+SKIP = reason_to_skip()
+pytestmark = [pytest.mark.extended, pytest.mark.skipif(SKIP is not None, reason=str(SKIP))]
+
+MILL = [
+    "G0 X-30 Y-20",
+    "G64 P0.01\nG1 F6000 X-40\nY-40\nX-60 Z-5",
+    "G61\nG1 F5000 X-40\nY-40\nX-60",
+    "G17\nG1 F3000 X-40 Y-40\nG2 I-10 J0\nG3 X-40 Y-60 J-10",
+    "G64 P0.1\nG1 F8000\n" + "\n".join(f"X-{40 + k % 2 * 15} Y-{20 + k}" for k in range(8)),
+    "G0 Z-30\nG81 X-40 Y-30 Z-40 R-31 F600\nX-50\nG80\nG0 Z-1",
+    "G64\nG1 F4000\n"
+    + "\n".join(f"X-{50 + 8 * math.cos(k / 4):.4f} Y-{50 + 8 * math.sin(k / 4):.4f}" for k in range(26)),
+    "G1 F4000 X-50 Y-50\nG2 X-60 Y-60 Z-12 J-10\nG1 Z-2",
+    "G0 X-200 Y-100 Z-50\nG0 X-10 Y-10 Z-1",
+    "G93\nG1 X-30 F60\nX-35 Y-30 F90\nG94",
+]
+FIVE_AXES = [
+    "G0 X10 Y10 A5 C10",
+    "G64 P0.01\nG1 F5000 X20 A10 C20\nY20 Z-5 A0 C-30\nX0",
+    "G61\nG1 F3000 X5 A10\nX0 A0 C10\nC0",
+    "G93\n" + "\n".join(f"G1 X{k} Y{2 * k} A{k} C{3 * k} F120" for k in range(1, 9)) + "\nG94",
+    "G17\nG1 F4000 X20 Y0\nG2 X20 Y40 J20\nG1 X0 C45 A15\nX0 Y0",
+]
+CASES = {"mill": ("vmc", "xyz", MILL), "mikron": ("mikron_ucp710", "xyzac", FIVE_AXES)}
+
+
+class Session:
+    """Session of LinuxCNC without a screen, in a folder of its own."""
+
+    def __init__(self, folder: Path, name: str, changes: dict[str, str], programs: list[str]) -> None:
+        self.folder, self.log = folder, folder / "log.csv"
+        for file in (CHECKOUT / "linuxcnc").glob("*"):
+            if file.suffix in {".ini", ".hal", ".tbl"}:
+                shutil.copy(file, folder)
+        text = (folder / f"{name}.ini").read_text()
+        changes = {"DISPLAY": str(CHECKOUT / "linuxcnc/headless.py"), **changes}
+        for key, value in changes.items():
+            text, count = re.subn(rf"(?m)^{key} = .*$", f"{key} = {value}", text)
+            assert count, key
+        (folder / f"{name}.ini").write_text(text)
+        paths = []
+        for index, program in enumerate(programs):
+            paths.append(folder / f"{index}.ngc")
+            paths[-1].write_text(f"G21 G90 G94 G17 G64\n{program}\nM2\n")
+        with tempfile.TemporaryDirectory() as fifo_folder:
+            # Writable for the user to which the process of the realtime components changes.
+            os.chmod(fifo_folder, 0o777)
+            self.output, self.result = self.run(name, paths, Path(fifo_folder))
+
+    def run(self, name: str, paths: list[Path], fifo_folder: Path) -> tuple[str, dict[str, list[str]]]:
+        """Executes the programs; returns the output of LinuxCNC and the result of the user interface."""
+        result = self.folder / "result.json"
+        env = os.environ | {
+            "HOME": str(self.folder),
+            "RTAPI_UID": str(os.getuid() or 1000),
+            "RTAPI_FIFO_PATH": str(fifo_folder / "fifo"),
+            "VIRTUAL_AXES_PROGRAMS": ":".join(map(str, paths)),
+            "VIRTUAL_AXES_LOG": str(self.log),
+            "VIRTUAL_AXES_RESULT": str(result),
+        }
+        # The user interface needs the modules of the distribution's Python.
+        for key in ("PYTHONPATH", "LD_LIBRARY_PATH", "VIRTUAL_ENV"):
+            env.pop(key, None)
+        with (self.folder / "output.txt").open("w") as output:
+            process = subprocess.Popen(
+                ["linuxcnc", f"{name}.ini"],
+                cwd=self.folder,
+                env=env,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+            try:
+                process.wait(SESSION_S)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGTERM)
+                try:
+                    process.wait(20)
+                except subprocess.TimeoutExpired:
+                    os.killpg(process.pid, signal.SIGKILL)
+                    process.wait()
+        files = ["output.txt", "linuxcnc_print.txt", "linuxcnc_debug.txt"]
+        texts = [(self.folder / file).read_text() for file in files if (self.folder / file).exists()]
+        return "\n".join(texts), json.loads(result.read_text()) if result.exists() else {
+            "completed": [],
+            "messages": [],
+        }
+
+    def rows(self) -> list[list[float]]:
+        """Returns command and feedback of each joint in each servo period."""
+        with self.log.open() as file:
+            rows = [[float(cell) for cell in row] for row in list(csv.reader(file))[1:]]
+        assert [row[0] for row in rows] == list(range(len(rows))), "a row for each step"
+        return [row[1:] for row in rows]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def component(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Builds and installs the component as its Makefile does, and removes it at the end."""
+    folder = tmp_path_factory.mktemp("component")
+    for file in ("Makefile", "virtual_axes.c"):
+        shutil.copy(CHECKOUT / "linuxcnc" / file, folder)
+    variables = [f"INTERFACE={CHECKOUT}/crates/c/include", f"LIBRARY={LIBRARY}"]
+    subprocess.run(["make", "install", *variables], cwd=folder, check=True, capture_output=True, timeout=120)
+    yield
+    (MODULES / "virtual_axes.so").unlink()
+
+
+def completed(tmp_path: Path, name: str, changes: dict[str, str], programs: list[str]) -> Session:
+    """Returns a session that has completed all programs; LinuxCNC's task sometimes ends by itself under load."""
+    for attempt in range(ATTEMPTS):
+        folder = tmp_path / str(attempt)
+        folder.mkdir()
+        session = Session(folder, name, changes, programs)
+        if len(session.result["completed"]) == len(programs):
+            return session
+    raise AssertionError(f"{session.result}\n{session.output}")
+
+
+def simulated(session: Session, name: str, period_ms: int) -> list[dict[str, str]]:
+    """Returns the trace of `virtual_axes run` on the logged commands."""
+    machine, axes, _ = CASES[name]
+    setpoints, trace = session.folder / "setpoints.csv", session.folder / "trace.csv"
+    lines = ["time," + ",".join(axes)]
+    for k, row in enumerate(session.rows()):
+        values = [command * unit(axis) for axis, command in zip(axes, row[::2], strict=True)]
+        lines.append(",".join(map(repr, [k * period_ms / 1000, *values])))
+    setpoints.write_text("\n".join(lines) + "\n")
+    options = ["--machine", machine, "--set", f"periods.position_ms={period_ms}", "--trace", str(trace), "-q"]
+    subprocess.run([COMMAND, "run", setpoints, *options], check=True, capture_output=True, timeout=120)
+    with trace.open() as file:
+        return list(csv.DictReader(file))
+
+
+def unit(axis: str) -> float:
+    """Returns m per mm, or rad per degree."""
+    return math.pi / 180 if axis in "abc" else 0.001
+
+
+def scale(axis: str) -> float:
+    """Returns mm per m, or degrees per rad."""
+    return 180 / math.pi if axis in "abc" else 1000.0
+
+
+@pytest.mark.parametrize("period_ms", [1, 2, 6])
+@pytest.mark.parametrize("name", CASES)
+def test_feedback_has_the_bits_of_run_on_the_logged_commands(tmp_path: Path, name: str, period_ms: int) -> None:
+    _, axes, programs = CASES[name]
+    changes = {
+        "SERVO_PERIOD": str(period_ms * 1_000_000),
+        "SET": f"periods.position_ms={period_ms}",
+        # The limit of the following error is not under test here.
+        "FERROR": "50",
+        "MIN_FERROR": "50",
+    }
+    session = completed(tmp_path, name, changes, programs)
+    rows, trace = session.rows(), simulated(session, name, period_ms)
+    assert len(rows) > 500
+    for index, axis in enumerate(axes):
+        moved = [row[2 * index] for row in rows]
+        assert max(moved) - min(moved) > 1
+        wanted = [float(row[f"{axis}.position"]) * scale(axis) for row in trace[: len(rows)]]
+        assert [row[2 * index + 1] for row in rows] == wanted, axis
+
+
+def test_following_error_trips_at_the_computed_limit(tmp_path: Path) -> None:
+    wide = {"FERROR": "50", "MIN_FERROR": "50"}
+    (tmp_path / "wide").mkdir()
+    session = completed(tmp_path / "wide", "mill", wide, ["G0 X-30"])
+    commands = [row[0] for row in session.rows()]
+    positions = [float(row["x.position"]) * 1000 for row in simulated(session, "mill", 1)]
+    # The control compares the feedback that it has read with its command of the period before.
+    largest = max(abs(c - p) for c, p in zip(commands, positions[1:], strict=False))
+    assert 0.5 < largest < 5
+    passing = f"{1.001 * largest:.9f}"
+    (tmp_path / "passing").mkdir()
+    completed(tmp_path / "passing", "mill", {"FERROR": passing, "MIN_FERROR": passing}, ["G0 X-30"])
+    tripping = f"{0.999 * largest:.9f}"
+    (tmp_path / "tripping").mkdir()
+    for attempt in range(ATTEMPTS):
+        folder = tmp_path / "tripping" / str(attempt)
+        folder.mkdir()
+        tripped = Session(folder, "mill", {"FERROR": tripping, "MIN_FERROR": tripping}, ["G0 X-30"])
+        if tripped.result["messages"]:
+            break
+    assert tripped.result["completed"] == []
+    assert any("following error" in text for text in tripped.result["messages"]), tripped.result
+
+
+def test_pid_of_linuxcnc_closes_the_position_loop(tmp_path: Path) -> None:
+    changes = {"HALFILE": "mill-velocity.hal", "FERROR": "20", "MIN_FERROR": "20"}
+    rows = completed(tmp_path, "mill", changes, ["G1 F3000 X-40 Y-20 Z-5", "G4 P0.5"]).rows()
+    for command, position in zip(rows[-1][::2], rows[-1][1::2], strict=True):
+        assert abs(command) > 1
+        assert abs(command - position) < 2e-3
+    errors = [abs(row[0] - row[1]) for row in rows]
+    assert 1e-3 < max(errors) < 1
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "reason"),
+    [
+        ("OFF", "hold", "off=hold is unknown; allowed: stop, brake, coast"),
+        ("MACHINE", "vcm", "vmc"),
+        ("SET", "x.position_loop.gian=2", "x.position_loop.gain"),
+    ],
+)
+def test_invalid_module_parameters_name_what_is_allowed(tmp_path: Path, key: str, value: str, reason: str) -> None:
+    session = Session(tmp_path, "mill", {key: value}, [])
+    assert session.result["completed"] == []
+    assert reason in session.output
