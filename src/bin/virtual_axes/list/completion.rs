@@ -1,5 +1,6 @@
 //! Shell completions that contain the names of scenarios, part programs, machines and parameters, and man pages.
 
+use std::collections::BTreeSet;
 use std::error::Error;
 use std::ffi::OsStr;
 use std::path::Path;
@@ -56,12 +57,16 @@ fn or_files<'a>(names: impl Iterator<Item = &'a str>, begin: &OsStr) -> Vec<Comp
 /// Returns the keys of parameters that start with `begin`, each with `=`.
 fn parameter(begin: &OsStr) -> Vec<CompletionCandidate> {
     let start = begin.to_string_lossy();
-    let keys = DEFINITIONS.iter().flat_map(|definition| {
-        let key = listing::key(definition);
-        let joints = if key.starts_with("<joint>") { &JOINTS[..] } else { &JOINTS[..1] };
-        joints.iter().map(move |joint| key.replace("<joint>", joint) + "=").collect::<Vec<_>>()
-    });
-    keys.filter(|key| key.starts_with(&*start)).map(CompletionCandidate::new).collect()
+    // Some keys have one definition for linear and another for rotary axes.
+    let keys: BTreeSet<String> = DEFINITIONS
+        .iter()
+        .flat_map(|definition| {
+            let key = listing::key(definition);
+            let joints = if key.starts_with("<joint>") { &JOINTS[..] } else { &JOINTS[..1] };
+            joints.iter().map(move |joint| key.replace("<joint>", joint) + "=").collect::<Vec<_>>()
+        })
+        .collect();
+    keys.into_iter().filter(|key| key.starts_with(&*start)).map(CompletionCandidate::new).collect()
 }
 
 /// Returns the script that registers the completion of `command` at a shell.
