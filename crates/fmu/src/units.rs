@@ -1,6 +1,6 @@
 //! Units of the variables in base units of the SI, and units for their display.
 
-/// Units that a unit is displayed in, with the factor from it: those of a numerical control.
+/// Returns the units that a unit is displayed in, with the factor from it: those of a numerical control.
 pub(crate) fn display_units(name: &str) -> &'static [(&'static str, f64)] {
     match name {
         "m" => &[("mm", 1e3), ("µm", 1e6)],
@@ -11,7 +11,7 @@ pub(crate) fn display_units(name: &str) -> &'static [(&'static str, f64)] {
     }
 }
 
-/// Unit for the display of a variable: µm or mdeg for an error, otherwise the first of its unit.
+/// Returns the unit for the display of a variable: µm or mdeg for an error, otherwise the first of its unit.
 pub(crate) fn display_unit(variable: &str, unit: &str) -> Option<&'static str> {
     let units = display_units(unit);
     let fine = usize::from(variable.contains("error") && units.len() > 1);
