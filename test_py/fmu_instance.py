@@ -35,9 +35,9 @@ class Instance:
         )
         self.slave.instantiate(callbacks=self.callbacks)
 
-    def initialize(self, start: float = 0.0, **positions: float) -> None:
-        """Initializes with start positions by axis."""
-        self.slave.setupExperiment(startTime=start)
+    def initialize(self, start: float = 0.0, stop: float | None = None, **positions: float) -> None:
+        """Initializes with start positions by axis; `stop` is the stop time, s."""
+        self.slave.setupExperiment(startTime=start, stopTime=stop)
         self.slave.enterInitializationMode()
         for axis, position in positions.items():
             self.set(f"{axis}.start_position", position)

@@ -57,6 +57,46 @@ def test_variables_have_units_and_the_variability_of_the_schema(fmu: Fmu) -> Non
     assert fmu.description.coSimulation.canSerializeFMUstate
 
 
+def test_values_are_displayed_in_units_of_a_control(fmu: Fmu) -> None:
+    variables = {v.name: v for v in fmu.description.modelVariables}
+    factors = {(u.name, d.name): float(d.factor) for u in fmu.description.unitDefinitions for d in u.displayUnits}
+    wanted = {
+        "x.setpoint": ("m", "mm", 1e3),
+        "c.position": ("rad", "°", 180 / np.pi),
+        "x.velocity": ("m/s", "m/min", 60),
+        "c.velocity": ("rad/s", "rpm", 30 / np.pi),
+        "x.following_error": ("m", "µm", 1e6),
+        "c.following_error": ("rad", "mdeg", 180e3 / np.pi),
+    }
+    for name, (unit, display, factor) in wanted.items():
+        # FMPy resolves displayUnit to the definition.
+        found = variables[name].displayUnit
+        assert (variables[name].unit, getattr(found, "name", found)) == (unit, display)
+        assert factors[unit, display] == pytest.approx(factor, rel=1e-15)
+
+
+def test_no_step_ends_after_the_stop_time(instance: Callable[[], Instance]) -> None:
+    one, other = instance(), instance()
+    with pytest.raises(FMICallException):
+        one.slave.setupExperiment(startTime=1.0, stopTime=0.5)
+    assert one.messages == ["stopTime is 0.5; it must be finite and not before startTime, 1"]
+    one.initialize(stop=3 * TSP)
+    one.slave.doStep(0.0, TSP)
+    stored = one.slave.serializeFMUstate(one.slave.getFMUstate())
+    other.slave.setFMUstate(other.slave.deSerializeFMUstate(stored))
+    for each in (one, other):
+        each.slave.doStep(TSP, TSP)
+        with pytest.raises(FMICallException):
+            each.slave.doStep(2 * TSP, 2 * TSP)
+        assert "ends after stopTime, 0.018 s" in each.messages[-1]
+        each.slave.doStep(2 * TSP, TSP)
+        with pytest.raises(FMICallException):
+            each.slave.doStep(3 * TSP, TSI)
+    one.slave.reset()
+    one.initialize()
+    one.slave.doStep(0.0, 4 * TSP)
+
+
 def trace_of(folder: Path, scenario: str, *arguments: str) -> dict[str, np.ndarray]:
     """Returns the columns of the trace of a scenario."""
     trace = folder / "trace.csv"

@@ -344,13 +344,44 @@ fn table_and_json_contain_the_same_figures() {
 }
 
 #[test]
-fn completions_contain_the_subcommands() {
-    for shell in ["bash", "zsh", "fish"] {
-        let text = assert_runs(&["completions", shell]);
-        for word in ["run", "psec", "scenarios", "trace-period"] {
-            assert!(text.contains(word), "{shell}: {word}");
-        }
+fn completions_contain_subcommands_scenarios_machines_programs_parameters_and_files() {
+    let folder = TestFolder::new("completions");
+    let file = folder.file("ball.csv", "time,x\n");
+    let candidates = |words: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_virtual_axes"));
+        command.env("VIRTUAL_AXES_COMPLETE", "fish").args(["--", "virtual_axes"]).args(words);
+        command.current_dir(file.parent().expect("a folder"));
+        let text = String::from_utf8(command.output().expect("the command starts").stdout).expect("text");
+        text.lines().map(|line| line.split('\t').next().unwrap_or_default().to_owned()).collect::<Vec<_>>()
+    };
+    for (words, expected) in [
+        (&["rob"][..], &["robustness"][..]),
+        (&["run", "ball"], &["ballbar", "ballbar-both", "ball.csv"]),
+        (&["check", "circle-d"], &["circle-diamond-square"]),
+        (&["tune", "corner-90", "--also", "corner-4"], &["corner-45"]),
+        (&["run", "ballbar", "--machine", "gan"], &["gantry_router"]),
+        (&["machines", "--new", "vm"], &["vmc"]),
+        (&["run", "ballbar", "--set", "y.velocity_loop.g"], &["y.velocity_loop.gain="]),
+        (&["run", "ballbar", "--trace-pe"], &["--trace-period"]),
+    ] {
+        assert_eq!(candidates(words), expected, "{words:?}");
     }
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        assert!(assert_runs(&["completions", shell]).contains("VIRTUAL_AXES_COMPLETE"), "{shell}");
+    }
+}
+
+#[test]
+fn man_pages_have_the_options_of_each_command() {
+    let folder = TestFolder::new("man");
+    let pages = folder.path("man1");
+    assert_eq!(assert_runs(&["man", &pages]), "");
+    let page = |name: &str| std::fs::read_to_string(Path::new(&pages).join(name)).expect(name);
+    assert!(page("virtual_axes.1").contains("Virtual machine\\-tool axes"));
+    let tune = page("virtual_axes-tune.1");
+    assert!(tune.contains("\\-\\-modulus\\-margin") && tune.contains("Smallest modulus margin"), "{tune}");
+    let output = run(&["man", &folder.text_file("file", "")]);
+    assert_rejected(&output, &["name a folder that can be written"]);
 }
 
 /// Returns the peak resident memory of a run over a generated file of `seconds`, kB.

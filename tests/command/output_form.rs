@@ -54,6 +54,44 @@ fn tables_fit_a_terminal_of_100_columns() {
 }
 
 #[test]
+fn help_fits_a_terminal_of_80_columns() {
+    let subcommands = text(&["--help"]);
+    let names = subcommands.lines().skip_while(|line| *line != "Commands:").skip(1);
+    let names = names.take_while(|line| !line.is_empty()).filter(|line| !line.starts_with("   "));
+    let names: Vec<&str> = names.filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(names.len() > 15 && names.contains(&"tune"), "{names:?}");
+    for name in names.iter().filter(|name| **name != "help") {
+        let help = text(&[name, "--help"]);
+        assert!(help.lines().all(|line| line.chars().count() <= 80), "{help}");
+    }
+    assert!(subcommands.lines().all(|line| line.chars().count() <= 80), "{subcommands}");
+}
+
+#[test]
+fn the_verdict_is_bold_where_colors_are_wanted() {
+    let colored = |name: &str, value: &str, arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_virtual_axes"));
+        command.args(arguments).env_remove("NO_COLOR").env("CLICOLOR_FORCE", "1").env(name, value);
+        String::from_utf8(command.output().expect("the command starts").stdout).expect("text")
+    };
+    let run = ["run", "x-constant"];
+    let plain = text(&run);
+    let (verdict, rest) = plain.split_once('\n').expect("lines");
+    assert_eq!(colored("CLICOLOR", "1", &run), format!("\x1b[1m{verdict}\x1b[0m\n{rest}"));
+    // Standard output of the other commands is no terminal.
+    assert!(!plain.contains('\x1b'));
+    for (name, value) in [("NO_COLOR", "1"), ("CLICOLOR_FORCE", "0")] {
+        assert_eq!(colored(name, value, &run), plain, "{name}={value}");
+    }
+    for form in ["--json", "--csv"] {
+        assert_eq!(
+            colored("CLICOLOR", "1", &["run", "x-constant", form]),
+            text(&["run", "x-constant", form])
+        );
+    }
+}
+
+#[test]
 fn compared_runs_stand_in_columns_below_their_verdict() {
     let text = text(&["run", "ballbar", "--controller", "cascade,gpc"]);
     let mut lines = text.lines();

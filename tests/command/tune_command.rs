@@ -79,7 +79,7 @@ fn the_first_grid_has_the_requested_number_of_designs() {
     // The default grid is the smallest.
     assert_eq!(json(&[&arguments[..], &["--designs", "1"]].concat()), coarse);
     // More than the 1968 designs of the default grid and its refinement.
-    const DESIGNS: u64 = 4000;
+    const DESIGNS: u64 = 20_000;
     let designs = DESIGNS.to_string();
     arguments.extend(["--designs", &*designs]);
     let fine = json(&arguments);

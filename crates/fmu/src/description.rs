@@ -7,7 +7,7 @@ use virtual_axes_core::config::{Parameters, Value};
 use virtual_axes_core::state_codec::checksum;
 
 use crate::resources::MACHINE_FILE;
-use crate::units::base_unit;
+use crate::units::{base_unit, display_unit, display_units};
 use crate::variables::{Causality, FmuType, FmuVariable, FmuVariables, text_value};
 
 /// Name of the library in the archive, without extension, and `modelIdentifier` of the model description.
@@ -89,7 +89,10 @@ fn write_units(out: &mut String, variables: &[FmuVariable]) {
     out.push_str("<UnitDefinitions>\n");
     for unit in units {
         let base = base_unit(unit).map(|base| format!("<BaseUnit {base}/>")).unwrap_or_default();
-        let _ = writeln!(out, "<Unit name=\"{}\">{base}</Unit>", escaped(unit));
+        let display =
+            |(name, factor): &(&str, f64)| format!("<DisplayUnit name=\"{name}\" factor=\"{factor:?}\"/>");
+        let display: String = display_units(unit).iter().map(display).collect();
+        let _ = writeln!(out, "<Unit name=\"{}\">{base}{display}</Unit>", escaped(unit));
     }
     out.push_str("</UnitDefinitions>\n");
 }
@@ -105,6 +108,9 @@ fn write_variable(out: &mut String, reference: usize, variable: &FmuVariable) {
     let mut attributes = String::new();
     if !variable.unit.is_empty() && variable.kind == FmuType::Real {
         let _ = write!(attributes, " unit=\"{}\"", escaped(variable.unit));
+        if let Some(display) = display_unit(&variable.name, variable.unit) {
+            let _ = write!(attributes, " displayUnit=\"{display}\"");
+        }
     }
     if let Some((min, max)) = &variable.range {
         let _ = write!(attributes, " min=\"{min}\" max=\"{max}\"");

@@ -102,7 +102,7 @@ fmi_functions! {
         Ok(())
     }
 
-    /// Sets the start time, s.
+    /// Sets the start time and the stop time, s; no step ends after the stop time.
     ///
     /// # Safety
     /// `c` is null or an instance of this library.
@@ -111,14 +111,19 @@ fmi_functions! {
         _tolerance_defined: c_int,
         _tolerance: f64,
         start_time: f64,
-        _stop_time_defined: c_int,
-        _stop_time: f64,
+        stop_time_defined: c_int,
+        stop_time: f64,
     ) {
         instance.slave.require(&[Phase::Instantiated])?;
         if !start_time.is_finite() {
             return Err(format!("startTime is {start_time}; it must be finite"));
         }
+        let stop_time = if stop_time_defined == 0 { f64::MAX } else { stop_time };
+        if !stop_time.is_finite() || stop_time < start_time {
+            return Err(format!("stopTime is {stop_time}; it must be finite and not before startTime, {start_time}"));
+        }
         instance.slave.start_time = start_time;
+        instance.slave.stop_time = stop_time;
         Ok(())
     }
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use virtual_axes_core::config::{Assignment, Parameters, Value, ValueSource, parse_assignment};
 use virtual_axes_core::machine::{AxisSample, Machine, MachineParameters, check_input};
+use virtual_axes_core::units::Rounded;
 
 use crate::signals::SignalReader;
 use crate::variables::{Causality, FmuType, FmuVariable, FmuVariables, VariableRole, text_value};
@@ -46,6 +47,8 @@ pub(crate) struct Slave {
     pub uses_preview: bool,
     pub start_positions: Vec<f64>,
     pub start_time: f64,
+    /// Last time that a step may end at, s; the largest number without one.
+    pub stop_time: f64,
 }
 
 pub(crate) fn discretized(parameters: &Parameters) -> Result<Arc<MachineParameters>, String> {
@@ -68,6 +71,7 @@ impl Slave {
             uses_preview: false,
             start_positions: vec![0.0; axes],
             start_time: 0.0,
+            stop_time: f64::MAX,
         })
     }
 
@@ -117,6 +121,15 @@ impl Slave {
             ));
         }
         let time = self.time();
+        if (time + step - self.stop_time) * 1e9 > 0.5 * period {
+            return Err(format!(
+                "the step from {} s by {} s ends after stopTime, {} s, of fmi2SetupExperiment; end there by \
+                 fmi2Terminate",
+                Rounded(time),
+                Rounded(step),
+                Rounded(self.stop_time)
+            ));
+        }
         if (point - time).abs() * 1e9 <= 0.5 * period {
             self.apply()?;
             for (axis, &load) in self.loads.iter().enumerate() {

@@ -7,7 +7,7 @@ use virtual_axes_core::state_codec::{SealedBytes, seal};
 use crate::slave::{Phase, Slave, discretized};
 
 /// First bytes of a state; the last two are the version of the format.
-const HEAD: [u8; 8] = *b"vastfm01";
+const HEAD: [u8; 8] = *b"vastfm02";
 
 impl Slave {
     /// Returns head, phase, inputs, machine file and state of the machine, then the checksum of these.
@@ -19,6 +19,7 @@ impl Slave {
         bytes.push(Phase::ALL.iter().position(|phase| *phase == slave.phase).unwrap_or_default() as u8);
         bytes.push(u8::from(slave.uses_preview));
         bytes.extend(slave.start_time.to_le_bytes());
+        bytes.extend(slave.stop_time.to_le_bytes());
         for values in [&slave.psec, &slave.loads, &slave.start_positions, &slave.preview] {
             bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
         }
@@ -43,6 +44,7 @@ impl Slave {
         slave.uses_preview = flags[1] != 0;
         slave.is_changed = false;
         slave.start_time = reader.number().ok_or_else(damaged)?;
+        slave.stop_time = reader.number().ok_or_else(damaged)?;
         for values in [&mut slave.psec, &mut slave.loads, &mut slave.start_positions, &mut slave.preview] {
             for value in values {
                 *value = reader.number().filter(|&value| check_input(value).is_ok()).ok_or_else(damaged)?;

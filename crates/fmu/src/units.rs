@@ -1,4 +1,22 @@
-//! Units of the variables in base units of the SI.
+//! Units of the variables in base units of the SI, and units for their display.
+
+/// Returns the units that a unit is displayed in, with the factor from it: those of a numerical control.
+pub(crate) fn display_units(name: &str) -> &'static [(&'static str, f64)] {
+    match name {
+        "m" => &[("mm", 1e3), ("µm", 1e6)],
+        "rad" => &[("°", 57.295_779_513_082_32), ("mdeg", 57_295.779_513_082_32)],
+        "m/s" => &[("m/min", 60.0)],
+        "rad/s" => &[("rpm", 9.549_296_585_513_721)],
+        _ => &[],
+    }
+}
+
+/// Returns the unit for the display of a variable: µm or mdeg for an error, otherwise the first of its unit.
+pub(crate) fn display_unit(variable: &str, unit: &str) -> Option<&'static str> {
+    let units = display_units(unit);
+    let fine = usize::from(variable.contains("error") && units.len() > 1);
+    units.get(fine).map(|(name, _)| *name)
+}
 
 /// Exponents and factor of the unit in base units, attributes of `BaseUnit`; none for an unknown unit.
 pub(crate) fn base_unit(name: &str) -> Option<&'static str> {

@@ -24,15 +24,18 @@ mod tune;
 
 use std::error::Error;
 use std::io::{self, Write};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::error::ContextKind;
 use clap::{CommandFactory, Parser, Subcommand};
-use clap_complete::Shell;
+use clap_complete::{CompleteEnv, Shell};
 use virtual_axes_core::config::listing;
 use virtual_axes_core::text::is_control;
 
-use crate::output::{interrupt, print_error};
+use crate::arguments::output_arguments::OutputFormat;
+use crate::list::completion;
+use crate::output::{emphasis, interrupt, print_error};
 
 /// Exit status of `check` if setpoints are beyond a limit.
 const BEYOND_LIMITS: u8 = 1;
@@ -43,7 +46,7 @@ const INVALID_RESULT: u8 = 3;
 
 /// Simulate virtual machine-tool axes offline.
 #[derive(Debug, Parser)]
-#[command(version, about, after_help = "Example: virtual_axes run ballbar")]
+#[command(version, about, term_width = 80, after_help = "Example: virtual_axes run ballbar")]
 struct CommandLine {
     #[command(subcommand)]
     command: Command,
@@ -108,16 +111,41 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Print a completion script for a shell.
+    /// Print the script for the completion of commands, scenarios, machines and parameters in a shell.
     Completions {
         /// Shell.
         shell: Shell,
     },
+    /// Write the man pages of the commands.
+    Man {
+        /// Folder, such as ~/.local/share/man/man1; created if it does not exist.
+        #[arg(value_name = "FOLDER")]
+        folder: PathBuf,
+    },
+}
+
+impl Command {
+    /// Returns true if the first line of the output is a verdict.
+    fn prints_verdict(&self) -> bool {
+        let output = match self {
+            Command::Run(arguments) => arguments.output(),
+            Command::Tune(arguments) => arguments.output(),
+            Command::Learn(arguments) => arguments.output(),
+            Command::Robustness(arguments) => arguments.output(),
+            _ => return false,
+        };
+        matches!(output.format(), OutputFormat::Text | OutputFormat::Quiet)
+    }
 }
 
 fn main() -> ExitCode {
+    CompleteEnv::with_factory(|| completion::with_names(CommandLine::command()))
+        .var(completion::VARIABLE)
+        .complete();
     interrupt::install_handler();
-    let text = match run_command(&command_line().command) {
+    let command = command_line().command;
+    let text = match run_command(&command) {
+        Ok(text) if command.prints_verdict() => emphasis::with_bold_verdict(text),
         Ok(text) => text,
         Err(error) => {
             if let Some(invalid) = error.downcast_ref::<identify::invalid_result::InvalidResult>() {
@@ -185,11 +213,9 @@ fn run_command(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Parameters { .. } => Ok(listing::text()),
         Command::Interface { json: true } => Ok(list::interface::json()),
         Command::Interface { json: false } => Ok(list::interface::text()),
-        Command::Completions { shell } => {
-            let mut text = Vec::new();
-            let name = CommandLine::command().get_name().to_owned();
-            clap_complete::generate(*shell, &mut CommandLine::command(), name, &mut text);
-            Ok(String::from_utf8(text)?)
+        Command::Completions { shell } => completion::script(&CommandLine::command(), &shell.to_string()),
+        Command::Man { folder } => {
+            completion::write_man_pages(CommandLine::command(), folder).map(|()| String::new())
         }
     }
 }

@@ -36,6 +36,7 @@ use virtual_axes_report::runs::axis_warnings;
 pub struct CheckArguments {
     /// Machine file (ROS 2 parameter file), scenario file, setpoints (CSV, MCAP, YAML), part program (.nc, .ngc,
     /// .tap, .cnc, .mpf, .gcode, .iso, .eia), or name of a built-in machine or scenario.
+    #[arg(value_name = "MACHINE|SCENARIO|FILE")]
     file: PathBuf,
     /// Machine for a scenario, setpoints or a part program: built-in machine or machine file.
     #[arg(long, default_value = DEFAULT_MACHINE)]

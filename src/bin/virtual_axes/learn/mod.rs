@@ -51,14 +51,21 @@ pub struct LearnArguments {
     /// Run the programmed and the learned setpoints on the machine with these parameters as well; can be repeated.
     #[arg(long, value_name = "KEY=VALUE[,KEY=VALUE]…")]
     on: Vec<String>,
-    /// Write the compensated setpoints of the best run to this file.
-    #[arg(long, value_name = "FILE.csv|FILE.mcap|FILE.yaml")]
+    /// Write the compensated setpoints of the best run to this file: .csv, .mcap or .yaml.
+    #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Write a page with plots to this file.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
     #[command(flatten)]
     output: OutputArguments,
+}
+
+impl LearnArguments {
+    /// Returns the form of the output.
+    pub fn output(&self) -> OutputArguments {
+        self.output
+    }
 }
 
 fn learning_gain(text: &str) -> Result<f64, String> {

@@ -1,5 +1,6 @@
 //! `virtual_axes machines`, `scenarios` and `parameters`: lists of built-in files and of parameters.
 
+pub mod completion;
 pub mod interface;
 
 use std::error::Error;

@@ -1,5 +1,6 @@
 //! Output of the commands: error messages, tables, pages, files, progress.
 
+pub mod emphasis;
 pub mod interrupt;
 pub mod machine_file;
 pub mod progress;

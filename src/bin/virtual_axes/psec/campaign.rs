@@ -25,8 +25,8 @@ pub struct CampaignArguments {
     #[arg(long, value_enum)]
     part: Option<FeedforwardName>,
     /// Output file: CSV (`time,x` in s and m or rad), MCAP with a JointTrajectory on `/psec`, or YAML for
-    /// `ros2 topic pub`.
-    #[arg(long, value_name = "FILE.csv|FILE.mcap|FILE.yaml")]
+    /// `ros2 topic pub`, by the extension .csv, .mcap or .yaml.
+    #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Built-in machine or machine file whose limits and sampling period apply.
     #[arg(long, default_value = DEFAULT_MACHINE)]

@@ -43,8 +43,8 @@ struct ScenarioPsecArguments {
     /// Built-in scenario or part program, scenario file, or part program file (`.nc`, `.ngc`, …).
     scenario: String,
     /// Output file: CSV (`time,x,y,…` in s, m, rad), MCAP with a JointTrajectory on `/psec`, or YAML for
-    /// `ros2 topic pub`.
-    #[arg(long, value_name = "FILE.csv|FILE.mcap|FILE.yaml")]
+    /// `ros2 topic pub`, by the extension .csv, .mcap or .yaml.
+    #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Built-in machine or machine file whose limits and sampling period apply.
     #[arg(long, default_value = DEFAULT_MACHINE)]

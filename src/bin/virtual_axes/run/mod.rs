@@ -53,6 +53,13 @@ pub struct RunArguments {
     output: OutputArguments,
 }
 
+impl RunArguments {
+    /// Returns the form of the output.
+    pub fn output(&self) -> OutputArguments {
+        self.output
+    }
+}
+
 /// Runs the command and returns tables of errors or JSON.
 pub fn run(arguments: &RunArguments) -> Result<String, Box<dyn Error>> {
     let machine = arguments.trial.machine()?;

@@ -82,6 +82,11 @@ pub struct TuneArguments {
 }
 
 impl TuneArguments {
+    /// Returns the form of the output.
+    pub fn output(&self) -> OutputArguments {
+        self.output
+    }
+
     fn seed(&self) -> u64 {
         self.seed.unwrap_or(1)
     }

@@ -34,6 +34,13 @@ pub struct RobustnessArguments {
     output: OutputArguments,
 }
 
+impl RobustnessArguments {
+    /// Returns the form of the output.
+    pub fn output(&self) -> OutputArguments {
+        self.output
+    }
+}
+
 fn relative_deviation(text: &str) -> Result<f64, String> {
     /// Larger deviations would reduce the inertia to a value that cannot be simulated.
     const MOST: f64 = 0.8;
