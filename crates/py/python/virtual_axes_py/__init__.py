@@ -29,16 +29,18 @@ from .run import Circle, Run
 from .shards import merge
 from .stepper import Stepper
 from .study import SweepResults, random_variants, sweep
-from .tuning import TuningResult, tune
+from .tuning import LearningResult, RobustnessResult, TuningResult, learn, robustness, tune
 
 __all__ = [
     "SIGNALS",
     "TOOL_SIGNALS",
     "Circle",
     "Identification",
+    "LearningResult",
     "Machine",
     "Optimum",
     "PartProgram",
+    "RobustnessResult",
     "Rst",
     "Run",
     "Scenario",
@@ -49,6 +51,7 @@ __all__ = [
     "__version__",
     "design",
     "identify",
+    "learn",
     "machine_names",
     "merge",
     "nc_program",
@@ -56,6 +59,7 @@ __all__ = [
     "optimize",
     "plot_bode",
     "random_variants",
+    "robustness",
     "scenario",
     "scenario_names",
     "sweep",
