@@ -294,3 +294,32 @@ def test_a_program_runs_in_real_time(start: Callable[..., AxesClient]) -> None:
         sent.cancel()
         assert sent.status(30) == GoalStatus.STATUS_CANCELED
         assert_within_limits(states_of(programs, sent))
+
+
+def test_the_setup_of_the_machine_file_applies(tmp_path: Path) -> None:
+    """Work offset and tool length shift Z, tool change and spindle add their times, and P is in milliseconds."""
+    text = (ROOT / "config" / "vmc.yaml").read_text(encoding="utf-8")
+    head = "    machine: Vertical mill (representative)\n"
+    setup = """    part_program:
+      dialect: fanuc
+      work_offsets: ["G55=-400,-250,-420"]
+      tools: ["T1 Z62.5 D10"]
+      tool_change_s: 4.5
+      spindle_s: 1.25
+"""
+    machine = tmp_path / "mill.yaml"
+    machine.write_text(text.replace(head, head + setup), encoding="utf-8")
+    with Node(["--params-file", str(machine), "-p", "time:=fast"]) as process, AxesClient(process=process) as drive:
+        with Follow(drive, f"{drive.target}/run_program", kind=RunProgram) as follow:
+            times = []
+            for auxiliary in ("", "T1 M6\nM3 S900\nG4 P500\n"):
+                text = f"G55 G43 H1 G0 X10 Y20 Z30\n{auxiliary}G0 X11\nM30\n"
+                sent = follow.send(Goal(program=text))
+                ended = sent.ended(60)
+                assert ended.status == GoalStatus.STATUS_SUCCEEDED, ended.result
+                states = states_of(follow, sent)
+                position = [states["psec", joint][-1] for joint in "xyz"]
+                assert position == pytest.approx([-0.389, -0.23, -0.3275], abs=1e-12)
+                times.append(ended.result.cycle_time)
+                go_home(drive)
+    assert times[1] - times[0] == pytest.approx(4.5 + 1.25 + 0.5, abs=0.011)

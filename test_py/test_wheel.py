@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from pathlib import Path
 
 import control
@@ -176,9 +177,43 @@ def test_options_of_a_part_program_are_those_of_the_command(machine: va.Machine,
         machine.simulate(va.nc_program(str(file)))
 
 
+def test_the_setup_of_a_part_program_shifts_the_part_and_adds_its_times(tmp_path: Path) -> None:
+    mill = va.Machine.load("vmc")
+    file = tmp_path / "part.nc"
+    file.write_text("G55 G43 H1 G0 X10 Y20 Z30\nT1 M6\nM3 S900\nG4 P500\nG0 X11\nM30\n")
+    table = tmp_path / "shop.tbl"
+    table.write_text("T1 Z62.5 D10\n")
+    setup = {"dialect": "fanuc", "work_offset": {"G55": (-0.4, -0.25, -0.42)}, "tools": {1: (0.0625, 0.005)}}
+    times = {"tool_change_s": 4.5, "spindle_s": 1.25}
+
+    def psec(program: va.PartProgram) -> np.ndarray:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return program.psec(mill)
+
+    plain = psec(va.nc_program(str(file), **setup))
+    assert plain[-1] == pytest.approx([-0.389, -0.23, -0.3275], abs=1e-12)
+    texts = {"work_offset": "G55=-400,-250,-420", "tools": table}
+    assert np.array_equal(psec(va.nc_program(str(file), **{**setup, **texts})), plain)
+    timed = va.nc_program(str(file), **setup, **times)
+    for program in (timed, pickle.loads(pickle.dumps(timed))):
+        added = len(psec(program)) - len(plain)
+        assert added * 0.002 == pytest.approx(4.5 + 1.25, abs=1e-9)
+    # The parameters of a machine file apply where nothing is given.
+    shop = {"part_program.dialect": "fanuc", "part_program.work_offsets": ["G55=-400,-250,-420"]}
+    shop |= {"part_program.tools": ["T1 Z62.5"], "part_program.tool_change_s": 4.5, "part_program.spindle_s": 1.25}
+    mill = mill.with_(shop)
+    assert np.array_equal(psec(va.nc_program(str(file))), psec(timed))
+
+
 @pytest.mark.parametrize(
     ("call", "error", "text"),
     [
+        (lambda m: va.nc_program("a.nc", dialect="okuma"), ValueError, "okuma: not a dialect; must be one of"),
+        (lambda m: va.nc_program("a.nc", work_offset="G54=1"), ValueError, "work_offset G54=1: must be a work"),
+        (lambda m: va.nc_program("a.nc", tools={1: (1e9, 0)}), ValueError, "tools: line 1: Z1"),
+        (lambda m: va.nc_program("a.nc", tools="/nowhere.tbl"), ValueError, "tools: /nowhere.tbl"),
+        (lambda m: va.nc_program("a.nc", spindle_s=-1.0), ValueError, "spindle_s -1: must be at least 0"),
         (lambda m: va.Machine.load("nowhere"), ValueError, "nowhere"),
         (lambda m: m.with_({"x.foo": 1}), ValueError, "unknown parameter x.foo"),
         (lambda m: m.with_({"x.position_loop.gain": object()}), TypeError, "x.position_loop.gain"),

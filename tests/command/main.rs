@@ -19,6 +19,7 @@ mod limit_audit;
 mod output_form;
 mod own_machines;
 mod part_programs;
+mod program_setup;
 mod reference;
 mod run_part_program;
 mod tune_command;

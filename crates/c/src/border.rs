@@ -115,6 +115,34 @@ pub(crate) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Result<&'a 
         .map_err(|_| BorderError::invalid(format!("{name}: {:?} is not UTF-8", text.to_string_lossy())))
 }
 
+/// Returns the `count` texts behind a pointer, which may be null if there are none.
+///
+/// # Errors
+/// A null pointer, or a text that is not UTF-8.
+///
+/// # Safety
+/// `pointer` is null, or points to `count` pointers, each of them null or to a text that ends with a null character.
+pub(crate) unsafe fn texts<'a>(
+    pointer: *const *const c_char,
+    count: usize,
+    name: &str,
+) -> Result<Vec<&'a str>, BorderError> {
+    if count == 0 {
+        return Ok(Vec::new());
+    }
+    if pointer.is_null() {
+        return Err(BorderError::null(name));
+    }
+    // SAFETY: it is not null, and the caller promises this number of pointers.
+    let pointers = unsafe { std::slice::from_raw_parts(pointer, count) };
+    // SAFETY: the caller promises texts.
+    pointers
+        .iter()
+        .enumerate()
+        .map(|(index, &one)| unsafe { text(one, &format!("{name}[{index}]")) })
+        .collect()
+}
+
 /// Returns the `count` inputs of axes behind a pointer, which must be `wanted`.
 ///
 /// # Errors

@@ -35,11 +35,13 @@ mod stepping;
 pub use border::{VaStatus, va_last_error};
 pub use machine::{
     VaMachine, va_axis_count, va_axis_is_rotary, va_axis_name, va_create, va_create_from_text,
-    va_current_period_ns, va_destroy, va_parameter, va_position_period_ns, va_set_parameter, va_version,
+    va_create_with, va_current_period_ns, va_destroy, va_parameter, va_position_period_ns, va_set_parameter,
+    va_version,
 };
 pub use signals::{VaSignals, va_currents, va_positions, va_signals, va_velocities};
 pub use state::{VaState, va_destroy_state, va_restore, va_save};
 pub use state_bytes::{va_state_read, va_state_size, va_state_write};
 pub use stepping::{
-    va_preview_length, va_reset, va_set_loads, va_set_preview, va_step, va_step_for_ns, va_time_ns,
+    VaDriveMode, va_preview_length, va_reset, va_set_drive_mode, va_set_loads, va_set_preview,
+    va_set_velocities, va_step, va_step_for_ns, va_time_ns,
 };

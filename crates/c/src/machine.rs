@@ -6,7 +6,7 @@ use std::sync::Arc;
 use virtual_axes_core::config::{AxisKind, MachineConfig, Parameters, Value, ValueSource, parse_assignment};
 use virtual_axes_core::machine::{Machine, MachineParameters};
 
-use crate::border::{BorderError, VaStatus, guard, reference, reference_mut, text};
+use crate::border::{BorderError, VaStatus, guard, reference, reference_mut, text, texts};
 
 /// Machine with its state.
 pub struct VaMachine {
@@ -82,6 +82,36 @@ pub unsafe extern "C" fn va_create(name: *const c_char, machine: *mut *mut VaMac
         create(machine, || {
             Parameters::load(text(name, "name")?, virtual_axes_builtin::MACHINES)
                 .map_err(BorderError::invalid)
+        })
+    }
+}
+
+/// Creates a machine as `va_create` does, with changed parameters: `count` texts such as `x.position_loop.gain=2`, in the
+/// names and units of the machine file.
+///
+/// All of them are set at once, also periods and parameters that need each other. `*machine` is null after an error.
+///
+/// # Safety
+/// `name` is null or a text that ends with a null character, `assignments` null or a pointer to `count` of them, `machine`
+/// null or a pointer to a pointer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn va_create_with(
+    name: *const c_char,
+    assignments: *const *const c_char,
+    count: usize,
+    machine: *mut *mut VaMachine,
+) -> VaStatus {
+    // SAFETY: the caller promises texts and pointer.
+    unsafe {
+        create(machine, || {
+            let source = ValueSource::named("assignments");
+            let texts = texts(assignments, count, "assignments")?;
+            let mut parameters = Parameters::load(text(name, "name")?, virtual_axes_builtin::MACHINES)
+                .map_err(BorderError::invalid)?;
+            let assignments =
+                texts.into_iter().map(|text| parse_assignment(text, &source)).collect::<Result<_, _>>();
+            parameters.set_all(assignments.map_err(BorderError::invalid)?).map_err(BorderError::invalid)?;
+            Ok(parameters)
         })
     }
 }

@@ -1,7 +1,23 @@
 //! Steps: position cycles, parts of them, loads, preview.
 
+use virtual_axes_core::machine::DriveMode;
+
 use crate::border::{BorderError, VaStatus, guard, inputs, reference_mut};
 use crate::machine::VaMachine;
+
+/// Mode of a drive.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum VaDriveMode {
+    /// Position control: the axis follows the setpoints `psec`.
+    VaPosition = 0,
+    /// Velocity control: the axis follows the velocities of `va_set_velocities`; 0 is a controlled stop.
+    VaVelocity = 1,
+    /// Drive off with short-circuited windings: the motor brakes by its back-EMF; the current is not limited.
+    VaShortCircuit = 2,
+    /// Drive off, coasting: the motor current is 0.
+    VaCoast = 3,
+}
 
 /// Longest step, ns: 1000 s.
 const LONGEST_STEP_NS: u64 = 1_000_000_000_000;
@@ -80,6 +96,56 @@ pub unsafe extern "C" fn va_set_loads(machine: *mut VaMachine, loads: *const f64
         // SAFETY: the caller promises this number of values.
         let loads = unsafe { inputs(loads, count, machine.axis_count(), "loads") }?;
         loads.iter().enumerate().for_each(|(axis, &load)| machine.machine.set_load(axis, load));
+        Ok(())
+    })
+}
+
+/// Sets the mode of the drive of an axis, a `VaDriveMode`, from the next position cycle on; `va_reset` returns to
+/// `VA_POSITION`.
+///
+/// A drive that is off has no holding brake: a vertical axis falls or sinks. When it is switched on, the integrals of its
+/// controllers start from 0. The caller lets `psec` follow the position before it switches to `VA_POSITION`.
+///
+/// # Safety
+/// `machine` is null or a machine of this library.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn va_set_drive_mode(machine: *mut VaMachine, axis: usize, mode: u32) -> VaStatus {
+    guard(|| {
+        // SAFETY: the caller promises a machine.
+        let machine = unsafe { reference_mut(machine, "machine") }?;
+        let count = machine.axis_count();
+        if axis >= count {
+            return Err(BorderError::invalid(format!("axis is {axis}; it must be below {count}")));
+        }
+        let mode = DriveMode::ALL.get(mode as usize).ok_or_else(|| {
+            let most = DriveMode::ALL.len() - 1;
+            BorderError::invalid(format!("mode is {mode}; it must be a VaDriveMode, 0 to {most}"))
+        })?;
+        machine.machine.set_drive_mode(axis, *mode);
+        Ok(())
+    })
+}
+
+/// Sets the velocities, m/s or rad/s within ±10⁶, one per axis, from the next position cycle on: the setpoints of axes in
+/// `VA_VELOCITY`; of axes in `VA_POSITION` they are added to the output of the position controller. `va_reset` sets 0.
+///
+/// # Safety
+/// `machine` is null or a machine of this library, `velocities` null or a pointer to `count` numbers.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn va_set_velocities(
+    machine: *mut VaMachine,
+    velocities: *const f64,
+    count: usize,
+) -> VaStatus {
+    guard(|| {
+        // SAFETY: the caller promises a machine.
+        let machine = unsafe { reference_mut(machine, "machine") }?;
+        // SAFETY: the caller promises this number of values.
+        let velocities = unsafe { inputs(velocities, count, machine.axis_count(), "velocities") }?;
+        velocities
+            .iter()
+            .enumerate()
+            .for_each(|(axis, &velocity)| machine.machine.set_velocity(axis, velocity));
         Ok(())
     })
 }

@@ -60,6 +60,14 @@ static void bad_calls(VaMachine *machine) {
   values[2] = NAN;
   check_error(va_step(machine, values, AXES), VA_INVALID, "psec[2]");
   check_error(va_set_loads(machine, values, AXES), VA_INVALID, "loads[2]");
+  check_error(va_set_velocities(machine, values, AXES), VA_INVALID, "velocities[2]");
+  check_error(va_set_drive_mode(machine, AXES, VA_COAST), VA_INVALID, "below 5");
+  check_error(va_set_drive_mode(machine, 0, 4), VA_INVALID, "mode is 4; it must be a VaDriveMode, 0 to 3");
+  const char *period[] = {"periods.position_ms=0.3"}, *gain[] = {"x.position_loop.gian=2", NULL};
+  check_error(va_create_with("mikron_ucp710", period, 1, &none), VA_INVALID, "periods.position_ms");
+  check_error(va_create_with("mikron_ucp710", gain, 1, &none), VA_INVALID, "x.position_loop.gain");
+  check_error(va_create_with("mikron_ucp710", gain, 2, &none), VA_NULL_POINTER, "assignments[1]");
+  check_error(va_create_with("mikron_ucp710", NULL, 1, &none), VA_NULL_POINTER, "assignments");
   check_error(va_reset(machine, values, AXES), VA_INVALID, "positions[2]");
   check_error(va_set_preview(machine, NULL, 3), VA_NULL_POINTER, "preview");
   check_error(va_set_preview(machine, values, SIZE_MAX), VA_INVALID, "cycles");
@@ -182,6 +190,25 @@ int main(void) {
   double velocity[AXES], current[AXES];
   CHECK(va_velocities(machine, velocity, AXES) == VA_OK && signals.velocity == velocity[0]);
   CHECK(va_currents(machine, current, AXES) == VA_OK && signals.current == current[0]);
+
+  /* A machine with 1 ms for the position cycle: X moves under velocity control, stops, and is under position control again. */
+  const char *changes[] = {"periods.position_ms=1", "x.delays.alpha_ms=0"};
+  VaMachine *fast = NULL;
+  CHECK(va_create_with("mikron_ucp710", changes, 2, &fast) == VA_OK && va_position_period_ns(fast) == 1000000);
+  double speeds[AXES] = {0.05};
+  memset(psec, 0, sizeof psec);
+  CHECK(va_set_drive_mode(fast, 0, VA_VELOCITY) == VA_OK && va_set_velocities(fast, speeds, AXES) == VA_OK);
+  CHECK(va_step_for_ns(fast, 1000000000, psec, AXES) == VA_OK && va_velocities(fast, velocity, AXES) == VA_OK);
+  CHECK(fabs(velocity[0] - 0.05) < 1e-9 && velocity[1] == 0);
+  speeds[0] = 0;
+  CHECK(va_set_velocities(fast, speeds, AXES) == VA_OK && va_step_for_ns(fast, 300000000, psec, AXES) == VA_OK);
+  CHECK(va_positions(fast, position, AXES) == VA_OK && fabs(position[0] - 0.05) < 0.002);
+  psec[0] = position[0];
+  CHECK(va_set_drive_mode(fast, 0, VA_POSITION) == VA_OK && va_step_for_ns(fast, 300000000, psec, AXES) == VA_OK);
+  CHECK(va_positions(fast, other, AXES) == VA_OK && fabs(position[0] - other[0]) < 1e-6);
+  CHECK(va_set_drive_mode(fast, 0, VA_COAST) == VA_OK && va_step(fast, psec, AXES) == VA_OK);
+  CHECK(va_signals(fast, 0, &signals) == VA_OK && signals.current_setpoint == 0 && !signals.is_saturated);
+  va_destroy(fast);
 
   CHECK(va_reset(machine, NULL, 0) == VA_OK && va_time_ns(machine) == 0);
   CHECK(va_positions(machine, position, AXES) == VA_OK && position[0] == 0);

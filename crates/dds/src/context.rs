@@ -9,6 +9,7 @@ use rustdds::DomainParticipantSecurityConfigFiles;
 
 use crate::defects::{dispose, static_peers};
 use crate::environment::Environment;
+use crate::hosts;
 use crate::node::Node;
 use crate::security::Security;
 #[cfg(not(feature = "security"))]
@@ -76,6 +77,7 @@ impl Context {
         if let Security::Unprotected(reason) = security {
             tracing::warn!("communication of this node is not protected: {reason}");
         }
+        hosts::set_range(environment.range());
         let participant = builder.build().map_err(|error| failed(error.to_string()))?;
         static_peers::announce(&participant, environment.static_peers());
         Ok(Self { participant: Some(participant), environment: environment.clone() })

@@ -24,9 +24,11 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
 
 mod context;
+pub mod datagrams;
 mod defects;
 mod discovery;
 mod environment;
+mod hosts;
 mod node;
 mod publisher;
 mod qos;

@@ -1,6 +1,7 @@
 //! Errors of simulated part programs: motions at feed apart from rapid traverse, orientation of a standing tip.
 
 use std::cell::RefCell;
+use std::f64::consts::TAU;
 use std::fs;
 use std::path::Path;
 
@@ -8,7 +9,7 @@ use virtual_axes_builtin::PROGRAMS;
 use virtual_axes_core::config::{MachineConfig, Parameters};
 use virtual_axes_core::trial::{self, Figures, GridRows, GridSource, Measures, SetpointSource, Trial};
 use virtual_axes_nc::offline::{
-    LineErrors, PartProgramOptions, PartProgramSource, ProgramFigures, ProgramTrack,
+    CycleError, LineErrors, PartProgramOptions, PartProgramSource, ProgramFigures, ProgramTrack,
 };
 
 /// Approach and retract at rapid traverse around a cut with a corner.
@@ -45,8 +46,18 @@ fn trial_of(machine: &MachineConfig) -> Trial<'_> {
     }
 }
 
-/// Simulates a program; returns its figures, those of its lines, and its setpoints with their kinds of motion.
-fn run(name: &str, text: &str) -> (Figures, ProgramFigures, Vec<f64>, Vec<bool>) {
+/// Simulated program.
+struct Run {
+    figures: Figures,
+    program: ProgramFigures,
+    /// Setpoints with their kinds of motion.
+    rows: Vec<f64>,
+    rapid: Vec<bool>,
+    cycles: Vec<CycleError>,
+}
+
+/// Simulates a program.
+fn run(name: &str, text: &str) -> Run {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     fs::write(&path, text).unwrap();
     let (machine, name) = (machine(), path.to_str().unwrap());
@@ -58,19 +69,19 @@ fn run(name: &str, text: &str) -> (Figures, ProgramFigures, Vec<f64>, Vec<bool>)
         rows.extend_from_slice(&row);
         rapid.push(source.is_rapid());
     }
-    let mut lines = LineErrors::new(&machine);
+    let (mut lines, mut cycles) = (LineErrors::new(&machine), Vec::new());
     let source = SetpointSource::Grid(Box::new(open()));
     let outcome = trial::run(&trial_of(&machine), source, |tick| {
-        lines.add(&tick, &mut track.borrow_mut());
+        cycles.extend(lines.add(&tick, &mut track.borrow_mut()));
         Ok(())
     });
-    let program = lines.finish(name, PROGRAMS, &track.borrow(), |_| ()).unwrap();
-    (outcome.unwrap().figures, program, rows, rapid)
+    let program = lines.finish(name, PROGRAMS, &track.borrow(), |cycle| cycles.push(*cycle)).unwrap();
+    Run { figures: outcome.unwrap().figures, program, rows, rapid, cycles }
 }
 
 #[test]
 fn motions_at_feed_and_rapid_traverse_have_errors_of_their_own() {
-    let (figures, program, rows, mut rapid) = run("pocket.nc", POCKET);
+    let Run { figures, program, rows, mut rapid, .. } = run("pocket.nc", POCKET);
     let contour = figures.contour.unwrap();
     let rapids = contour.rapids.unwrap();
     // At up to 30 m/min the axes deviate more than at 0.6 m/min.
@@ -94,7 +105,7 @@ fn motions_at_feed_and_rapid_traverse_have_errors_of_their_own() {
 
 #[test]
 fn the_orientation_of_a_standing_tip_is_compared_at_equal_times() {
-    let (figures, program, ..) = run("turns.nc", TURNS);
+    let Run { figures, program, .. } = run("turns.nc", TURNS);
     let turning = figures.axes.iter().filter(|axis| axis.name == "a" || axis.name == "c");
     // The axes follow with a lag of degrees, far above the error of the same time.
     assert!(turning.clone().any(|axis| axis.report.max_following_error > 0.5_f64.to_radians()));
@@ -105,4 +116,70 @@ fn the_orientation_of_a_standing_tip_is_compared_at_equal_times() {
     for worst in &program.worst_rapids {
         assert!(worst.orientation < 0.1_f64.to_radians(), "{worst:?}");
     }
+}
+
+/// Returns the distance of a point from the line between two others.
+fn from_line(point: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
+    let step: Vec<f64> = (0..3).map(|i| to[i] - from[i]).collect();
+    let square = step.iter().map(|value| value * value).sum::<f64>();
+    let along = (0..3).map(|i| step[i] * (point[i] - from[i])).sum::<f64>() / square.max(f64::MIN_POSITIVE);
+    let along = along.clamp(0.0, 1.0);
+    (0..3).map(|i| (point[i] - from[i] - along * step[i]).powi(2)).sum::<f64>().sqrt()
+}
+
+#[test]
+fn errors_are_those_against_the_programmed_corner() {
+    // A corner between lines of 80 mm is passed at the tolerance.
+    for (tolerance, feed) in [(0.2, 600.0), (0.05, 100.0), (1.0, 1500.0)] {
+        let text = format!("G21 G90 G64 P{tolerance}\nG1 X80 F{feed}\nY80\nM2\n");
+        let Run { program, cycles, .. } = run(&format!("corner_{tolerance}.nc"), &text);
+        let cuts = program.cuts.unwrap();
+        assert!(program.rapids.is_none() || program.rapids.unwrap().max < 1e-6);
+        assert!((cuts.blending / (1e-3 * tolerance) - 1.0).abs() < 0.01, "{tolerance}: {cuts:?}");
+        let start = cycles[0].tip;
+        let at = |x: f64, y: f64| [start[0] + 0.08 * x, start[1] + 0.08 * y, start[2]];
+        let expected = |cycle: &CycleError| {
+            let lines = [(at(0.0, 0.0), at(1.0, 0.0)), (at(1.0, 0.0), at(1.0, 1.0))];
+            lines.map(|(from, to)| from_line(cycle.tip, from, to)).into_iter().fold(f64::INFINITY, f64::min)
+        };
+        for cycle in &cycles {
+            assert!((cycle.contour_error - expected(cycle)).abs() < 1e-9, "{cycle:?}");
+            assert!(cycle.contour_error <= cycle.blending + cycle.drives + 1e-12, "{cycle:?}");
+        }
+        // The corner itself is farthest from the tool path.
+        let corner = at(1.0, 0.0);
+        let tips = cycles.windows(2).map(|pair| from_line(corner, pair[0].tip, pair[1].tip));
+        let largest = tips.fold(f64::INFINITY, f64::min);
+        assert!((cuts.max - largest).abs() < 1e-9, "{cuts:?} {largest}");
+        assert!(cuts.max <= cuts.blending + cuts.drives);
+        let worst = &program.worst_lines[0];
+        assert!(worst.error == cuts.max && worst.error <= worst.blending + worst.drives + 1e-12, "{worst:?}");
+    }
+}
+
+#[test]
+fn errors_of_arcs_and_of_exact_paths_have_no_share_of_blending() {
+    // A circle of 20 mm on an exact path: the polyline of setpoints is within its sagitta.
+    let Run { program, cycles, .. } = run("circle.nc", "G21 G90 G61 G17\nG1 X20 F3000\nG3 I-20\nG1 X0\nM2\n");
+    let cuts = program.cuts.unwrap();
+    // 50 mm/s in cycles of 6 ms.
+    let sagitta = 0.3e-3_f64.powi(2) / (8.0 * 20e-3);
+    assert!(cuts.blending < 1.1 * sagitta, "{cuts:?}");
+    let start = cycles[0].tip;
+    // Away from both ends, where the path is followed in order.
+    let (first, last) = (22e-3, 18e-3 + TAU * 20e-3);
+    for cycle in cycles.iter().filter(|cycle| (first..last).contains(&cycle.path_position)) {
+        let radius = (cycle.tip[0] - start[0]).hypot(cycle.tip[1] - start[1]);
+        let expected = (radius - 20e-3).abs();
+        assert!((cycle.contour_error - expected).abs() < 1e-8, "{cycle:?} {expected}");
+    }
+}
+
+#[test]
+fn the_path_of_a_turning_table_has_no_share_of_blending_on_an_exact_path() {
+    // The tip stands on the workpiece or moves along a line while the tables turn.
+    let text = "G21 G90 G61.1 G43.4 H1\nG1 X10 Y5 Z20 F3000\nX30 A-20 C40\nX0 A0 C0\nM2\n";
+    let cuts = run("tables.nc", text).program.cuts.unwrap();
+    assert!(cuts.blending < 0.2e-6, "{cuts:?}");
+    assert!((cuts.max - cuts.drives).abs() < 0.2e-6, "{cuts:?}");
 }

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::ffi::CString;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
@@ -14,7 +15,7 @@ use virtual_axes_core::simulation::joint_limits;
 use virtual_axes_core::text::{builtin_names, builtin_text};
 use virtual_axes_core::trial::{GridRows, GridSource, ProgramSource};
 use virtual_axes_io::files::PsecCsvReader;
-use virtual_axes_nc::interpret::IgnoredCodes;
+use virtual_axes_nc::interpret::{IgnoredCodes, ToolTable};
 use virtual_axes_nc::offline::{OverrideSchedule, PartProgramOptions, PartProgramSource, ProgramTrack};
 use virtual_axes_nc::plan::PlanOptions;
 
@@ -203,6 +204,24 @@ struct ProgramArguments {
     /// G and M codes without effect.
     #[pyo3(item)]
     ignore: Vec<String>,
+    /// Dialect; `None` for that of the machine, or the detected one.
+    #[pyo3(item)]
+    dialect: Option<String>,
+    /// Work offsets, as in `G54=120,80,-350`.
+    #[pyo3(item)]
+    work_offset: Vec<String>,
+    /// File with the tool table.
+    #[pyo3(item)]
+    tool_table: Option<PathBuf>,
+    /// Tools in the notation of LinuxCNC.
+    #[pyo3(item)]
+    tools: Vec<String>,
+    /// Duration of a tool change, s.
+    #[pyo3(item)]
+    tool_change_s: Option<f64>,
+    /// Duration of a change of the spindle speed, s.
+    #[pyo3(item)]
+    spindle_s: Option<f64>,
     /// Bound of the chord error, m.
     #[pyo3(item)]
     chord_error: Option<f64>,
@@ -213,7 +232,7 @@ struct ProgramArguments {
 
 impl ProgramArguments {
     fn options(&self) -> Result<PartProgramOptions, String> {
-        let ProgramArguments { feed_override, ignore, chord_error, centripetal_acceleration } = self;
+        let ProgramArguments { feed_override, ignore, chord_error, centripetal_acceleration, .. } = self;
         if !(*feed_override > 0.0 && *feed_override <= 2.0) {
             return Err(format!("feed_override {feed_override}: must be above 0 and at most 2"));
         }
@@ -224,20 +243,39 @@ impl ProgramArguments {
                 return Err(format!("{name} {bound}: must be above 0 and finite"));
             }
         }
+        for (name, time) in [("tool_change_s", self.tool_change_s), ("spindle_s", self.spindle_s)] {
+            if let Some(time) = time.filter(|time| !(*time >= 0.0 && time.is_finite())) {
+                return Err(format!("{name} {time}: must be at least 0 and finite"));
+            }
+        }
         let codes =
             ignore.iter().map(|code| code.parse().map_err(|error| format!("ignore {code:?}: {error}")));
+        let offset = |text: &String| text.parse().map_err(|error| format!("work_offset {error}"));
         let default = PlanOptions::default();
         Ok(PartProgramOptions {
             schedule: OverrideSchedule::constant(*feed_override),
             ignored: IgnoredCodes::new(codes.collect::<Result<_, _>>()?),
+            dialect: self.dialect.as_deref().map(str::parse).transpose()?,
+            work_offsets: self.work_offset.iter().map(offset).collect::<Result<_, _>>()?,
+            tools: self.tools()?,
+            tool_change_time: self.tool_change_s,
+            spindle_time: self.spindle_s,
             plan: PlanOptions {
                 chord_error: chord_error.unwrap_or(default.chord_error),
                 centripetal_acceleration: centripetal_acceleration
                     .unwrap_or(default.centripetal_acceleration),
                 ..default
             },
-            ..PartProgramOptions::default()
         })
+    }
+
+    fn tools(&self) -> Result<ToolTable, String> {
+        let table = match (&self.tool_table, &self.tools[..]) {
+            (Some(path), _) => ToolTable::from_file(path),
+            (None, []) => return Ok(ToolTable::default()),
+            (None, lines) => ToolTable::parse(&lines.join("\n")),
+        };
+        table.map_err(|error| format!("tools: {error}"))
     }
 }
 

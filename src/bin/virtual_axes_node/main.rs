@@ -7,6 +7,8 @@
 #[allow(dead_code)]
 mod builtin;
 #[cfg(target_os = "linux")]
+mod datagrams;
+#[cfg(target_os = "linux")]
 mod epoll_wait;
 
 use std::ffi::OsString;

@@ -115,7 +115,8 @@ impl Planning {
         let ProgramText { name, reader } = source;
         // The sender is dropped if the motion is canceled before its start, or at shutdown.
         let Ok(rest) = rest.blocking_recv() else { return Ok(()) };
-        let mut options = InterpreterOptions::for_machine(&machine).starting_at(&rest);
+        let mut options =
+            InterpreterOptions::for_machine(&machine).with_setup(machine.part_program())?.starting_at(&rest);
         if let ProgramReader::File(_) = reader {
             options.subprogram_folder = program_folder(&name, &[]);
         }

@@ -55,6 +55,8 @@ pub struct Output<M: Serialize> {
 
 /// Queue of writes for which the middleware had no space, in order.
 struct Queue {
+    /// Held from the first poll of a write until it is written or queued, so that no later write overtakes it.
+    order: tokio::sync::Mutex<()>,
     writes: mpsc::Sender<Write>,
     /// Number of queued writes, including the one in progress.
     pending: Arc<AtomicUsize>,
@@ -86,11 +88,13 @@ impl Queue {
             }
         };
         let dropped = Arc::clone(dropped);
-        (Queue { writes, pending, overflow, is_stalled: AtomicBool::new(false), dropped }, task)
+        let (order, is_stalled) = (tokio::sync::Mutex::default(), AtomicBool::new(false));
+        (Queue { order, writes, pending, overflow, is_stalled, dropped }, task)
     }
 
     /// Writes at once if nothing is queued, so that a position cycle wakes no task per topic; queues otherwise.
     async fn write(&self, mut write: Write) {
+        let _order = self.order.lock().await;
         if self.pending.load(Ordering::Acquire) == 0 && (&mut write).now_or_never().is_some() {
             return;
         }
@@ -174,6 +178,8 @@ pub enum OverflowPolicy {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Mutex;
+    use std::task::Poll;
     use std::time::Instant;
 
     use super::*;
@@ -237,6 +243,42 @@ mod tests {
         drop(queue);
         reader.open.send_replace(true);
         task.await.expect("it ends");
+    }
+
+    #[tokio::test]
+    async fn a_write_does_not_overtake_one_that_has_found_no_space() {
+        let dropped = Arc::new(AtomicU64::new(0));
+        let (queue, task) = Queue::new(OverflowPolicy::Drop, &dropped, BLOCK_TIMEOUT, || {});
+        let (queue, written) = (Arc::new(queue), Arc::new(Mutex::new(Vec::new())));
+        let record = |name| {
+            let written = Arc::clone(&written);
+            move || written.lock().expect("not poisoned").push(name)
+        };
+        // The second write begins after the first has found no space and before it is queued.
+        let later: Arc<Mutex<Option<Write>>> = Arc::default();
+        let (same_queue, write_second, slot) = (Arc::clone(&queue), record("second"), Arc::clone(&later));
+        let mut begin_second =
+            Some(async move { same_queue.write(Box::pin(async move { write_second() })).await });
+        let write_first = record("first");
+        let first = std::future::poll_fn(move |context| match begin_second.take() {
+            Some(second) => {
+                let mut second: Write = Box::pin(second);
+                if second.as_mut().poll(context).is_pending() {
+                    *slot.lock().expect("not poisoned") = Some(second);
+                }
+                Poll::Pending
+            }
+            None => Poll::Ready(write_first()),
+        });
+        queue.write(Box::pin(first)).await;
+        let task = tokio::spawn(task);
+        let second = later.lock().expect("not poisoned").take();
+        if let Some(second) = second {
+            second.await;
+        }
+        drop(queue);
+        task.await.expect("it ends");
+        assert_eq!(*written.lock().expect("not poisoned"), ["first", "second"]);
     }
 
     #[tokio::test]

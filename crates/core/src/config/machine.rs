@@ -9,6 +9,7 @@
 use super::axis::{AxisConfig, MAX_GAIN};
 use super::declaration::{CheckedValues, Definitions, Field, numbers_of, parameters};
 use super::definition::{ParameterDefinition, number, text, texts};
+use super::part_program::PartProgramConfig;
 use super::rotary_chain::RotaryChain;
 use crate::units::{
     MICROSECOND_NS, MILLIMETER, MILLISECOND_NS, NEWTON_PER_MICROMETER, Nanoseconds, POSITION_GAIN,
@@ -53,6 +54,8 @@ parameters! {
         use WorkpieceConfig;
         /// Beam that couples two linear axes; `None` without one.
         pub(crate) gantry: Option<GantryConfig>;
+        /// Set-up for part programs.
+        pub(crate) part_program: PartProgramConfig;
     }
 }
 
@@ -171,6 +174,7 @@ impl MachineConfig {
             contour_gain: 0.0,
             workpiece: None,
             gantry: None,
+            part_program: PartProgramConfig::default(),
         }
     }
 
@@ -187,6 +191,11 @@ impl MachineConfig {
     /// Returns the beam that couples the two linear axes of a gantry; `None` without one.
     pub fn gantry(&self) -> Option<&GantryConfig> {
         self.gantry.as_ref()
+    }
+
+    /// Returns the set-up for part programs.
+    pub fn part_program(&self) -> &PartProgramConfig {
+        &self.part_program
     }
 
     /// Returns true if axes are coupled mechanically, by a workpiece or the beam of a gantry.

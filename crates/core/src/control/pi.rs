@@ -67,6 +67,11 @@ impl Pi {
         Pi { integral_gain, gain: (config.gain + integral_gain) * scale, scale, limit }
     }
 
+    /// Returns the controller with another limit of its output.
+    pub(crate) fn with_limit(self, limit: f64) -> Self {
+        Pi { limit, ..self }
+    }
+
     /// Returns the transfer function from error to output within the limit, (K + K T/Ti z/(z − 1)) scale, from
     /// `increment` z − 1.
     pub(crate) fn transfer(&self, increment: Complex<f64>) -> Complex<f64> {

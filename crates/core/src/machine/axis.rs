@@ -18,6 +18,7 @@ use crate::units::seconds;
 use super::compensation::FrictionCompensation;
 use super::controller::{create_position_controller, feedforward_config};
 use super::coupling::CouplingTorques;
+use super::drive_mode::DriveMode;
 use super::error::AxisError;
 use super::inner_loops::{
     DriveFeedback, InnerLoopInputs, InnerLoopState, InnerLoops, TickRecord, ZeroOrderHold,
@@ -173,6 +174,10 @@ pub struct Axis {
     load: f64,
     /// Offset that is added to the output of the position controller, rad/s of the motor.
     velocity_offset: f64,
+    /// Mode from the next position cycle on.
+    next_mode: DriveMode,
+    /// Mode in the present position cycle.
+    mode: DriveMode,
     /// Part of cross-coupled control in the output of the position controller, rad/s of the motor; 0 between two
     /// position cycles.
     contour_offset: f64,
@@ -222,6 +227,8 @@ impl Axis {
         let mut axis = Axis {
             load: 0.0,
             velocity_offset: 0.0,
+            next_mode: DriveMode::Position,
+            mode: DriveMode::Position,
             contour_offset: 0.0,
             backlash_offset: BacklashOffset::default(),
             psec: SetpointHistory::new(position, p.ticks_per_position, p.setpoint_window()),
@@ -251,7 +258,9 @@ impl Axis {
             p.torque_delay.hold(self.psec.present_index(), |k| p.feedforward.torques(&self.psec, k)).after
         };
         let limit = p.torque_constant * p.max_current;
-        state.velocity.integral += (torque(old) - torque(p)).clamp(-limit, limit);
+        if self.mode == DriveMode::Position {
+            state.velocity.integral += (torque(old) - torque(p)).clamp(-limit, limit);
+        }
         // New filters start at rest at the present current setpoint.
         if old.loops.filters != p.loops.filters {
             state.filters = p.loops.filters.at_rest(state.current_setpoint);
@@ -269,6 +278,9 @@ impl Axis {
     /// Writes or replaces the state.
     pub(super) fn code(&mut self, codec: &mut StateCodec<'_>) {
         codec.numbers([&mut self.load, &mut self.velocity_offset, &mut self.previous_load]);
+        for mode in [&mut self.next_mode, &mut self.mode] {
+            *mode = DriveMode::ALL[codec.integer(*mode as u64, DriveMode::ALL.len() as u64 - 1) as usize];
+        }
         self.backlash_offset.code(codec);
         codec.numbers(self.coupling_torques.values_mut());
         self.psec.code(codec);
@@ -288,6 +300,34 @@ impl Axis {
 
     pub(super) fn set_velocity_offset(&mut self, offset: f64) {
         self.velocity_offset = offset;
+    }
+
+    /// Sets the velocity offset in units of the axis, m/s or rad/s.
+    pub(super) fn set_velocity(&mut self, p: &AxisParameters, velocity: f64) {
+        self.velocity_offset = velocity * p.inverse_ratio;
+    }
+
+    pub(super) fn set_mode(&mut self, mode: DriveMode) {
+        self.next_mode = mode;
+    }
+
+    /// Returns the mode of the drive in the present position cycle.
+    pub fn mode(&self) -> DriveMode {
+        self.mode
+    }
+
+    /// Returns true if the mode changes at the start of the next position cycle.
+    pub(super) fn has_new_mode(&self) -> bool {
+        self.next_mode != self.mode
+    }
+
+    /// Changes the mode at the start of a position cycle; the position controller takes over without a jump of Ω*.
+    pub(super) fn change_mode(&mut self, p: &AxisParameters, state: &mut InnerLoopState) {
+        self.mode.leave(p, state);
+        self.mode = self.next_mode;
+        if self.mode == DriveMode::Position {
+            self.position.begin_transfer();
+        }
     }
 
     /// Lets the load act from now on, within a position cycle; returns its torque, N·m at the motor.
@@ -340,20 +380,28 @@ impl Axis {
         let k = p.position_delay.index_at_cycle_start(present);
         self.sample.psec = history.at(present);
         self.sample.delayed_psec = history.at(k);
-        if feedback.max_current_excess > 0.0 {
+        if feedback.max_current_excess > 0.0 || self.mode.is_off() {
             self.position.record_saturated(feedback.speed);
         }
-        let velocity = p.velocity_delay.hold(present, |k| p.feedforward.velocities(history, k));
-        let torque = p.torque_delay.hold(present, |k| p.feedforward.torques(history, k));
+        let (velocity, torque) = match self.mode {
+            DriveMode::Position => (
+                p.velocity_delay.hold(present, |k| p.feedforward.velocities(history, k)),
+                p.torque_delay.hold(present, |k| p.feedforward.torques(history, k)),
+            ),
+            _ => Default::default(),
+        };
         let velocity_feedforward = velocity.at(0.0);
         let setpoint = |j| history.at(k + j) * p.inverse_ratio;
         self.backlash_offset.update(&p.backlash_compensation, setpoint(0) - setpoint(-1));
         let angle = self.measured_angle(p, feedback);
         let mut unlimited = p.position.update(&mut self.position, setpoint, angle, velocity_feedforward);
         let offset = self.velocity_offset + std::mem::take(&mut self.contour_offset);
-        // Adding 0 would change the sign of -0.
-        if offset != 0.0 {
-            unlimited += offset;
+        match self.mode {
+            // Adding 0 would change the sign of -0.
+            DriveMode::Position if offset == 0.0 => (),
+            DriveMode::Position => unlimited += offset,
+            DriveMode::Velocity => unlimited = self.velocity_offset,
+            DriveMode::ShortCircuit | DriveMode::Coast => unlimited = 0.0,
         }
         // An unstable RST controller (allow_unstable) can overflow: the axis stops then.
         let finite = if unlimited.is_finite() { unlimited } else { 0.0 };
@@ -382,6 +430,9 @@ impl Axis {
         p: &AxisParameters,
         velocity_cycle: usize,
     ) -> f64 {
+        if self.mode != DriveMode::Position {
+            return 0.0;
+        }
         // No compensation before the first setpoint.
         let Ok(period) = u64::try_from(self.psec.present_index()) else { return 0.0 };
         let tick = period * p.ticks_per_position + velocity_cycle as u64 * p.ticks_per_velocity;

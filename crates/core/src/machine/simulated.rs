@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::axis::{Axis, AxisParameters};
 use super::bank::{AxisBank, SimdWidth};
 use super::coupling::CouplingStep;
+use super::drive_mode::DriveMode;
 use super::error::MachineError;
 use super::inner_loops::TickSpan;
 use super::parameters::MachineParameters;
@@ -82,6 +83,9 @@ impl Machine {
         let (Some(axis), Some(p)) = (self.axes.get_mut(index), self.parameters.axes.get(index)) else {
             return;
         };
+        if axis.mode() != DriveMode::Position {
+            self.bank.set_loops(index, &p.loops);
+        }
         let (at_rest, state) = Axis::at_rest(p, position, coupling_torque);
         *axis = at_rest;
         self.bank.set_state(index, &state);
@@ -111,7 +115,7 @@ impl Machine {
             let mut state = self.bank.state(index);
             axis.update_parameters(old, p, &mut state);
             self.bank.set_state(index, &state);
-            self.bank.set_loops(index, &p.loops);
+            self.bank.set_loops(index, &axis.mode().loops(p));
             self.bank.set_event_driven(index, p.event_driven.clone());
             self.bank.set_elements(index, p.elements.clone());
             if old.compensation.is_some() {
@@ -179,6 +183,21 @@ impl Machine {
     pub fn set_velocity_offset(&mut self, axis: usize, offset: f64) {
         if let Some(axis) = self.axes.get_mut(axis) {
             axis.set_velocity_offset(offset);
+        }
+    }
+
+    /// Sets the velocity offset of one axis in its units, m/s or rad/s; see
+    /// [`set_velocity_offset`](Self::set_velocity_offset).
+    pub fn set_velocity(&mut self, axis: usize, velocity: f64) {
+        if let (Some(axis), Some(p)) = (self.axes.get_mut(axis), self.parameters.axes.get(axis)) {
+            axis.set_velocity(p, velocity);
+        }
+    }
+
+    /// Sets the mode of the drive of one axis from the next position cycle on; a reset returns to position control.
+    pub fn set_drive_mode(&mut self, axis: usize, mode: DriveMode) {
+        if let Some(axis) = self.axes.get_mut(axis) {
+            axis.set_mode(mode);
         }
     }
 
@@ -268,6 +287,12 @@ impl Machine {
         let parameters = &*self.parameters;
         for (index, (axis, &setpoint)) in self.axes.iter_mut().zip(psec).enumerate() {
             axis.set_setpoint(setpoint, &preview[index * known..][..known]);
+            if axis.has_new_mode() {
+                let (p, mut state) = (&parameters.axes[index], self.bank.state(index));
+                axis.change_mode(p, &mut state);
+                self.bank.set_loops(index, &axis.mode().loops(p));
+                self.bank.set_state(index, &state);
+            }
         }
         for contour_control in &parameters.contour_controls {
             contour_control.execute(&mut self.axes, &parameters.axes, &self.bank);

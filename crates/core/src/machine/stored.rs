@@ -3,11 +3,11 @@
 use std::fmt::Write;
 use std::sync::Arc;
 
-use super::{Machine, MachineParameters};
+use super::{DriveMode, Machine, MachineParameters};
 use crate::state_codec::{Fnv, StateCodec, checksum};
 
 /// First bytes of a state; the last two are the version of the format.
-const HEAD: [u8; 8] = *b"vastat05";
+const HEAD: [u8; 8] = *b"vastat06";
 /// Bytes of head, fingerprint of the parameters, and checksum.
 const FRAME: usize = 24;
 
@@ -91,6 +91,9 @@ impl Machine {
         self.tick = codec.integer(self.tick, longest.unsigned_abs());
         for (index, axis) in self.axes.iter_mut().enumerate() {
             axis.code(codec);
+            if matches!(codec, StateCodec::Reader { .. }) && axis.mode() != DriveMode::Position {
+                self.bank.set_loops(index, &axis.mode().loops(&self.parameters.axes[index]));
+            }
             self.bank.code(index, codec);
         }
     }

@@ -5,6 +5,7 @@ mod backlash;
 mod backlash_energy;
 mod bits;
 mod current_filter;
+mod drive_modes;
 mod drives;
 mod friction;
 mod gantry;

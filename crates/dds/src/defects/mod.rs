@@ -4,6 +4,7 @@
 mod announced_writers;
 pub(crate) mod announcement_eviction;
 pub(crate) mod client_discovery;
+pub(crate) mod datagram_bounds;
 pub(crate) mod discovery_gate;
 pub(crate) mod dispose;
 pub(crate) mod heartbeat_request;

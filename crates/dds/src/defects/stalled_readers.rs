@@ -66,11 +66,14 @@ impl StalledReaders {
             return;
         }
         let (first, end) = oldest_half(self.written(), self.max_unacknowledged);
+        if first == end {
+            return;
+        }
         let name = self.topic.trim_start_matches("rt");
         warn!(
             "stalled reader on {name}: no sample acknowledged (ACKNACK) for {waited_s} s, {} samples pending; the \
              oldest {} are discarded (GAP)",
-            self.max_unacknowledged,
+            self.written() - first + 1,
             end - first
         );
         let writer = self.writer.to_bytes();
@@ -84,9 +87,11 @@ impl StalledReaders {
 }
 
 /// Returns the oldest half of the unacknowledged samples after `written`: first number, and the number behind the last.
+///
+/// It contains only written numbers: readers would ignore the samples that get them later.
 fn oldest_half(written: i64, max_unacknowledged: i64) -> (i64, i64) {
     let first = (written - max_unacknowledged + 1).max(1);
-    (first, first + max_unacknowledged / 2)
+    (first, first + (written - first + 2) / 2)
 }
 
 #[cfg(test)]
@@ -98,5 +103,8 @@ mod tests {
         // Samples 1809 to 10 000 are unacknowledged.
         assert_eq!(oldest_half(10_000, 8192), (1809, 1809 + 4096));
         assert_eq!(oldest_half(31, 32), (1, 17));
+        // Few samples are written, and the write waits for another reason.
+        assert_eq!(oldest_half(200, 8192), (1, 101));
+        assert_eq!(oldest_half(0, 8192), (1, 1));
     }
 }

@@ -13,12 +13,13 @@
 //! discovery ports of the peers, which respond to the participant itself.
 
 use std::io;
-use std::net::{Ipv4Addr, SocketAddr, ToSocketAddrs, UdpSocket};
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, ToSocketAddrs, UdpSocket};
 use std::thread;
 
 use rustdds::{DomainParticipant, RTPSEntity};
 use tracing::warn;
 
+use crate::hosts;
 use crate::rtps::discovery_message::discovery_port;
 
 /// Number of participants of this host to which RustDDS 0.15 sends its announcement.
@@ -54,6 +55,7 @@ fn forward(own: &[u8], domain_id: u16, peers: &[String]) -> io::Result<()> {
         let datagram = &buffer[..length];
         if datagram.get(GUID_PREFIX) == Some(own) {
             for address in peers.iter().flat_map(|peer| addresses(peer, domain_id)) {
+                hosts::permit(*address.ip());
                 // The peer may be unreachable at present.
                 let _ = out.send_to(datagram, address);
             }
@@ -62,11 +64,15 @@ fn forward(own: &[u8], domain_id: u16, peers: &[String]) -> io::Result<()> {
 }
 
 /// Returns the discovery addresses of a peer. Its name is resolved each time, since it may appear later.
-fn addresses(peer: &str, domain_id: u16) -> Vec<SocketAddr> {
-    let resolved = (peer, 0).to_socket_addrs().into_iter().flatten().filter(SocketAddr::is_ipv4);
+fn addresses(peer: &str, domain_id: u16) -> Vec<SocketAddrV4> {
+    let ipv4 = |address| match address {
+        SocketAddr::V4(address) => Some(*address.ip()),
+        SocketAddr::V6(_) => None,
+    };
+    let resolved = (peer, 0).to_socket_addrs().into_iter().flatten().filter_map(ipv4);
     let ports = (0..PARTICIPANTS_OF_PEER).filter_map(|id| discovery_port(domain_id, id));
     let ports: Vec<u16> = ports.collect();
-    resolved.flat_map(|host| ports.iter().map(move |port| SocketAddr::new(host.ip(), *port))).collect()
+    resolved.flat_map(|host| ports.iter().map(move |port| SocketAddrV4::new(host, *port))).collect()
 }
 
 /// Binds the highest discovery port of this host that receives announcements and is free.

@@ -3,6 +3,7 @@
 //!
 //! All fields are little endian. Section numbers refer to RTPS 2.5.
 
+pub(crate) mod datagram;
 pub(crate) mod discovery_message;
 pub(crate) mod readers;
 
@@ -16,14 +17,18 @@ const PROTOCOL_VERSION: [u8; 2] = [2, 4];
 const VENDOR: [u8; 2] = [0x01, 0x12];
 
 // Kinds of submessages (9.4.5.1.1).
-const SUBMESSAGE_ACKNACK: u8 = 0x06;
-const SUBMESSAGE_HEARTBEAT: u8 = 0x07;
-const SUBMESSAGE_GAP: u8 = 0x08;
+const SUBMESSAGE_PAD: u8 = 0x01;
+pub(crate) const SUBMESSAGE_ACKNACK: u8 = 0x06;
+pub(crate) const SUBMESSAGE_HEARTBEAT: u8 = 0x07;
+pub(crate) const SUBMESSAGE_GAP: u8 = 0x08;
 const SUBMESSAGE_INFO_TS: u8 = 0x09;
+const SUBMESSAGE_INFO_SRC: u8 = 0x0c;
 const SUBMESSAGE_INFO_DST: u8 = 0x0e;
 const SUBMESSAGE_INFO_REPLY: u8 = 0x0f;
-const SUBMESSAGE_NACK_FRAG: u8 = 0x12;
-const SUBMESSAGE_DATA: u8 = 0x15;
+pub(crate) const SUBMESSAGE_NACK_FRAG: u8 = 0x12;
+pub(crate) const SUBMESSAGE_HEARTBEAT_FRAG: u8 = 0x13;
+pub(crate) const SUBMESSAGE_DATA: u8 = 0x15;
+pub(crate) const SUBMESSAGE_DATA_FRAG: u8 = 0x16;
 // Flags of submessages (9.4.5.1.2), and of DATA (9.4.5.3.1).
 const FLAG_LITTLE_ENDIAN: u8 = 0x01;
 const FLAG_INLINE_QOS: u8 = 0x02;

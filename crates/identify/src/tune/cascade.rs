@@ -42,7 +42,7 @@ const LONG: f64 = 1.0;
 /// Significant digits of the gains.
 const DIGITS: usize = 5;
 
-/// Searches the cascade gains (Kp, VFFW, TFFW) of each moving axis with the lowest cost.
+/// Searches cascade gains (Kp, VFFW, TFFW) of each moving axis with a low cost.
 ///
 /// Kv and Tv stay unchanged: the margins are those of the position loop and do not protect the velocity loop.
 /// `seed` determines the random starts; the same seed gives the same gains.

@@ -18,7 +18,7 @@ const BISECTIONS: usize = 20;
 /// Significant digits of a gain.
 const DIGITS: usize = 4;
 
-/// Searches the gain of cross-coupled control with the lowest cost; the position controllers keep their tuning.
+/// Searches a gain of cross-coupled control with a low cost; the position controllers keep their tuning.
 ///
 /// The margins are those of the position loops, along the path without and across it with the gain.
 ///

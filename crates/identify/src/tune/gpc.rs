@@ -17,8 +17,8 @@ pub const GRID_LAMBDA: [f64; 12] = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e
 
 /// Largest N2 of the local refinement.
 const MAX_N2: usize = 60;
-/// Number of best tunings refined in each round.
-const CENTERS: usize = 4;
+/// Number of starts refined in each round: the best tunings with different horizons.
+const CENTERS: usize = 8;
 /// Steps of N1, N2 and Nu to a neighbor.
 const STEPS: [isize; 4] = [-4, -1, 1, 4];
 /// Initial factor of λ_rel to a neighbor: less than half a step of the grid.
@@ -63,10 +63,12 @@ fn keep_cheapest(candidates: Vec<TuningCandidate>) -> Vec<TuningCandidate> {
     candidates
 }
 
-/// Searches the predictive controller, common to all moving axes, with the lowest cost.
+/// Searches a predictive controller, common to all moving axes, with a low cost.
 ///
-/// Runs every design of the grid and the preset of the machine within `limits`, then in rounds the neighbors
-/// of the best designs, also beyond the grid and between its λ_rel.
+/// Runs every design of the grid and the preset of the machine within `limits`. Then rounds refine λ_rel of the best
+/// designs with different horizons, and run their neighbors in N1, N2 and Nu, also beyond the grid, with each λ_rel of
+/// [`GRID_LAMBDA`], since the best λ_rel changes by a factor of 10 from one horizon to the next. The result is the best
+/// of these runs; the cost has many local minima, and a lower one is possible.
 ///
 /// # Errors
 /// [`TuneError`] if a run fails or no tuning is within the limits.
@@ -103,10 +105,9 @@ pub fn tune_gpc_from(
     let mut factor = FIRST_FACTOR;
     for _ in 0..ROUNDS {
         let Some(best) = tried.first().map(|best| best.cost) else { break };
-        let around: Vec<Tuning> = tried
-            .iter()
-            .take(CENTERS)
-            .flat_map(|center| neighbors(&center.tuning, factor))
+        let around: Vec<Tuning> = starts(&tried)
+            .into_iter()
+            .flat_map(|center| neighbors(center, factor))
             .filter(|tuning| key(tuning).is_some_and(|key| seen.insert(key)))
             .collect();
         designs += around.len();
@@ -160,7 +161,14 @@ pub(super) fn preset(problem: &TuningProblem<'_>) -> Option<Tuning> {
     alike.then_some(first)
 }
 
-/// Returns the neighbors of a tuning.
+/// Returns the best tunings with different horizons from `tried`, which is sorted by cost.
+fn starts(tried: &[TuningCandidate]) -> Vec<&Tuning> {
+    let mut horizons = HashSet::new();
+    let is_new = |tuning: &&Tuning| key(tuning).is_some_and(|(n1, n2, nu, _)| horizons.insert((n1, n2, nu)));
+    tried.iter().map(|candidate| &candidate.tuning).filter(is_new).take(CENTERS).collect()
+}
+
+/// Returns the neighbors of a tuning: its horizons with the next λ_rel, the next horizons with each λ_rel of the grid.
 fn neighbors(center: &Tuning, factor: f64) -> Vec<Tuning> {
     let Tuning::Gpc { n1, n2, nu, lambda_rel } = *center else { return Vec::new() };
     let mut around = Vec::new();
@@ -171,7 +179,7 @@ fn neighbors(center: &Tuning, factor: f64) -> Vec<Tuning> {
         let moved = |value: usize| value.saturating_add_signed(step);
         for (n1, n2, nu) in [(moved(n1), n2, nu), (n1, moved(n2), nu), (n1, n2, moved(nu))] {
             if (1..=n2).contains(&n1) && (1..=n2).contains(&nu) && n2 <= MAX_N2 {
-                around.push(Tuning::Gpc { n1, n2, nu, lambda_rel });
+                around.extend(GRID_LAMBDA.map(|lambda_rel| Tuning::Gpc { n1, n2, nu, lambda_rel }));
             }
         }
     }

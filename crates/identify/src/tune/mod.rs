@@ -1,4 +1,4 @@
-//! Search of position controller tunings that minimize a cost on a path.
+//! Search of position controller tunings with a low cost on a path; no search guarantees the global minimum.
 //!
 //! A [`TuningProblem`] combines a machine, a [`Workload`] and a [`Cost`]; it simulates tunings and returns
 //! their cost and the stability margins of the worst axis. [`tune_gpc`] searches tunings of a predictive

@@ -101,6 +101,38 @@ fn the_tuning_is_as_good_as_any_of_the_grid_by_brute_force() {
     assert!(kept.modulus >= 0.5 && kept.delay >= 0.005, "{kept:?}");
 }
 
+#[test]
+fn the_tuning_for_a_corner_is_as_good_as_a_grid_of_later_horizons_and_finer_weights() {
+    // A grid that the search does not have: N1 from 3, where the best λ is ten times lower than with N1 = 2.
+    let parameters = machine(&["x", "y"]);
+    let config = parameters.machine_config().expect("a machine");
+    let models =
+        [0, 1].map(|axis| prediction_model(&config.axes()[axis], &config.periods()).expect("a model"));
+    let path = workload(include_str!("../../../../config/scenarios/corner-90.yaml"), &config);
+    let horizons = (4..=7).flat_map(|n2| (3..=4).map(move |n1| (n1, n2)));
+    let weights = |(n1, n2)| (0..24).map(move |k| (n1, n2, 2, 2e-3 * 10_f64.powf(f64::from(k) / 15.0)));
+    let keeping = |&(n1, n2, nu, lambda_rel): &(usize, usize, usize, f64)| {
+        let tuning = GpcTuning { n1, n2, nu, weight: ControlWeight::Relative(lambda_rel) };
+        models.iter().all(|model| {
+            let design = gpc(model, &tuning).ok().and_then(|rst| margins(model, &rst).ok());
+            design.is_some_and(|margins| margins.modulus >= 0.5 && margins.delay >= 0.005)
+        })
+    };
+    let grid: Vec<_> = horizons.flat_map(weights).filter(keeping).collect();
+    assert!(grid.len() > 50, "only {} keep the margins", grid.len());
+    let contour_error = |&(n1, n2, nu, lambda_rel): &(usize, usize, usize, f64)| {
+        let tuned = with_gpc(&parameters, &["x", "y"], (n1 as i64, n2 as i64, nu as i64, lambda_rel));
+        let figures = path.run(&tuned, false, false, |_| Ok(())).expect("a run").figures;
+        figures.contour.expect("a contour").max / MICROMETER
+    };
+    let best = grid.par_iter().map(contour_error).min_by(f64::total_cmp).expect("a run");
+    let cost = Cost::default();
+    let problem = TuningProblem::new(&parameters, &path, &cost, &NoProgress).expect("a tuning problem");
+    let found = tune_gpc(&problem, &MarginLimits::default()).expect("a tuning").best;
+    // The search refines λ to 2 %, the grid has steps of 17 %.
+    assert!(found.cost <= best, "{} with {}, {best} on the grid", found.cost, found.tuning);
+}
+
 /// Runs a search with a number of threads.
 fn with_threads(threads: usize, search: impl Fn() -> SearchResult + Sync) -> SearchResult {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");

@@ -8,7 +8,7 @@ use virtual_axes_core::trial::{
     AxisFigures, BidirectionalFigures, CircleFigures, CornerFigures, Figures, Reference,
 };
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MICROMETER, MILLIDEGREE, MILLIMETER};
-use virtual_axes_nc::offline::{ProgramFigures, WorstLine};
+use virtual_axes_nc::offline::{ProgramFigures, ProgrammedErrors, WorstLine};
 
 /// Returns all figures as a JSON object, the keys of `virtual_axes run --json` (docs/reference/json.md).
 pub fn figures_json(figures: &Figures) -> Map<String, Value> {
@@ -34,11 +34,22 @@ pub fn part_program_json(figures: &ProgramFigures) -> Value {
             "text": worst.text,
             "cause": worst.cause.text(),
             "contour_error_um": worst.error / MICROMETER,
+            "blending_um": worst.blending / MICROMETER,
+            "drives_um": worst.drives / MICROMETER,
             "orientation_error_mdeg": worst.orientation / MILLIDEGREE,
             "time_s": worst.time,
         })
     };
+    let errors = |errors: ProgrammedErrors| {
+        json!({
+            "max": errors.max / MICROMETER,
+            "rms": errors.rms / MICROMETER,
+            "blending": errors.blending / MICROMETER,
+            "drives": errors.drives / MICROMETER,
+        })
+    };
     json!({
+        "contour_error_um": { "cuts": figures.cuts.map(errors), "rapids": figures.rapids.map(errors) },
         "cycle_time_s": figures.cycle_time,
         "programmed_time_s": figures.programmed_time,
         "worst_lines": figures.worst_lines.iter().map(line).collect::<Vec<_>>(),

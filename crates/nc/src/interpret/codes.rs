@@ -3,7 +3,7 @@
 //! Each group is an enum, so that the compiler points to the places where a new code must be executed. The same number
 //! may have another meaning in another dialect.
 
-use super::dialect::{ALL, Dialect, FANUC, GRBL, HAAS, LINUXCNC, MACH3};
+use super::dialect::{ALL, Dialect, FANUC, GRBL, HAAS, LINUXCNC, MACH3, OKUMA};
 use super::error::Outcome;
 
 /// Dialects with codes of production controls.
@@ -13,7 +13,9 @@ const FHM: u8 = FH | MACH3;
 /// Dialects on the base of RS-274/NGC.
 const NGC: u8 = LINUXCNC | MACH3 | GRBL;
 /// Dialects except grbl.
-const CYCLES: u8 = LINUXCNC | FHM;
+const CYCLES: u8 = LINUXCNC | FHM | OKUMA;
+/// Dialects except Okuma, where these codes have another meaning.
+const OTHERS: u8 = ALL & !OKUMA;
 
 /// Declares groups of codes: an enum for each, and a struct with the code of each group in a line.
 macro_rules! codes {
@@ -60,10 +62,8 @@ macro_rules! codes {
 
             /// Returns the dialects that have a code, as bits.
             fn dialects(number: u16) -> u8 {
-                match number {
-                    $($($number => $dialects,)+)+
-                    _ => 0,
-                }
+                let rows = [$($(($number, $dialects)),+),+];
+                rows.iter().filter(|(known, _)| *known == number).fold(0, |bits, (_, dialects)| bits | dialects)
             }
         }
     };
@@ -86,7 +86,7 @@ codes! {
         SynchronousTapping = 331 in LINUXCNC, "G33.1: tapping to a point and back";
         ChipBreaking = 730 in CYCLES, "G73: deep-hole drilling with short retractions";
         LeftTapping = 740 in CYCLES, "G74: left-hand tapping";
-        FineBoring = 760 in FHM, "G76: boring with a lateral shift before retraction";
+        FineBoring = 760 in FHM | OKUMA, "G76: boring with a lateral shift before retraction";
         BackBoring77 = 770 in HAAS, "G77: back boring from below";
         Cancel = 800 in ALL, "G80: end of the motion mode";
         Drilling = 810 in ALL, "G81: drilling";
@@ -95,31 +95,41 @@ codes! {
         Tapping = 840 in CYCLES, "G84: tapping";
         Boring = 850 in CYCLES, "G85: boring with retraction at feed";
         StopBoring = 860 in CYCLES, "G86: boring with spindle stop and retraction at rapid traverse";
-        BackBoring = 870 in FHM, "G87: back boring from below";
-        ManualBoring = 880 in FHM, "G88: boring with dwell, spindle stop and retraction";
+        BackBoring = 870 in FHM | OKUMA, "G87: back boring from below";
+        ManualBoring = 880 in FHM | OKUMA, "G88: boring with dwell, spindle stop and retraction";
         DwellBoring = 890 in CYCLES, "G89: boring with dwell and retraction at feed";
+        Skip = 310 in FHM | OKUMA, "G31: probing to the end of a straight line";
+        Probe382 = 382 in NGC, "G38.2: probing to the end of a straight line";
+        Probe383 = 383 in NGC, "G38.3: probing to the end of a straight line";
+        Probe384 = 384 in NGC, "G38.4: probing to the end of a straight line";
+        Probe385 = 385 in NGC, "G38.5: probing to the end of a straight line";
         LeftTapping174 = 1740 in HAAS, "G174: left-hand tapping";
         Tapping184 = 1840 in HAAS, "G184: tapping";
+        LeftTapping274 = 2740 in OKUMA, "G274: left-hand tapping";
+        Tapping284 = 2840 in OKUMA, "G284: tapping";
     }
     action: Action, "Code that acts in its line only" {
         Dwell = 40 in ALL, "G4: dwell";
         ClockwisePocket = 120 in HAAS | MACH3, "G12: clockwise circular pocket";
         CounterclockwisePocket = 130 in HAAS | MACH3, "G13: counterclockwise circular pocket";
-        Data = 100 in ALL, "G10: sets offsets and tools";
+        Data = 100 in OTHERS, "G10: sets offsets and tools";
         ReferenceCheck = 270 in FH, "G27: moves to a point";
         ToReference = 280 in ALL, "G28: moves to the first reference";
         StoreReference = 281 in NGC, "G28.1: stores the first reference";
         FromReference = 290 in FH, "G29: moves through the point of the last G28";
         ToSecondReference = 300 in ALL, "G30: moves to the second reference";
         StoreSecondReference = 301 in NGC, "G30.1: stores the second reference";
-        Shift = 520 in ALL, "G52: shifts all coordinate systems";
-        MachineCoordinates = 530 in ALL, "G53: line in machine coordinates";
+        Shift = 520 in OTHERS, "G52: shifts all coordinate systems";
+        MachineCoordinates = 530 in OTHERS, "G53: line in machine coordinates";
         TiltTool = 531 in FH, "G53.1: turns the tool axis normal to the tilted plane";
         MacroCall = 650 in FHM, "G65: calls a macro";
         ShiftToPosition = 920 in ALL, "G92: shifts all coordinate systems to coordinates of the position";
         ClearShift = 921 in ALL, "G92.1: clears the shift";
         SuspendShift = 922 in NGC, "G92.2: suspends the shift";
         RestoreShift = 923 in NGC, "G92.3: restores the shift";
+        ReturnLevel = 710 in OKUMA, "G71: level to which canned cycles with M53 retract";
+        ToolChange111 = 1110 in OKUMA, "G111: tool change";
+        ToolChange116 = 1160 in OKUMA, "G116: tool change";
     }
     modal_macro: ModalMacro, "Macro after each motion" {
         Call = 660 in FH, "G66: calls a macro after each motion";
@@ -159,13 +169,20 @@ codes! {
         Negative = 440 in FHM, "G44: negative length of a tool";
         Off = 490 in ALL, "G49: no length";
         CenterPoint234 = 2340 in HAAS, "G234: tool center point control";
+        AlongZ = 560 in OKUMA, "G56: length of a tool along Z";
+        OffByG53 = 530 in OKUMA, "G53: no length";
+        CenterPoint169 = 1690 in OKUMA, "G169: tool center point control";
+        CenterPointOff = 1700 in OKUMA, "G170: end of tool center point control";
     }
     coordinates: CoordinateSystem, "Work coordinate system" {
-        First = 540 in ALL, "G54"; Second = 550 in ALL, "G55"; Third = 560 in ALL, "G56";
-        Fourth = 570 in ALL, "G57"; Fifth = 580 in ALL, "G58"; Sixth = 590 in ALL, "G59";
+        First = 540 in OTHERS, "G54"; Second = 550 in OTHERS, "G55"; Third = 560 in OTHERS, "G56";
+        Fourth = 570 in OTHERS, "G57"; Fifth = 580 in OTHERS, "G58"; Sixth = 590 in OTHERS, "G59";
         Seventh = 591 in NGC, "G59.1"; Eighth = 592 in NGC, "G59.2"; Ninth = 593 in NGC, "G59.3";
         Additional = 541 in FH, "G54.1 P: additional systems";
         Additional154 = 1540 in HAAS, "G154 P: additional systems";
+    }
+    work_system: WorkSystem, "Work coordinate system by its number" {
+        Modal = 150 in OKUMA, "G15 H: modal"; Once = 160 in OKUMA, "G16 H: in its line";
     }
     path_control: PathControlCode, "Path control" {
         ExactPath = 610 in ALL, "G61: exact path";
@@ -173,7 +190,7 @@ codes! {
         Blend = 640 in ALL, "G64: blending";
     }
     exact_stop: ExactStop, "Exact stop of one line" {
-        Line = 90 in FH, "G9";
+        Line = 90 in FH | OKUMA, "G9";
     }
     retraction: Retraction, "Retraction of canned cycles" {
         ToInitial = 980 in ALL, "G98: to the position before the cycle";
@@ -194,12 +211,15 @@ codes! {
         Mirror = 511 in FH, "G51.1: mirroring";
         MirrorOff100 = 1000 in HAAS, "G100: end of mirroring";
         Mirror101 = 1010 in HAAS, "G101: mirroring";
+        MirrorByFlags = 620 in OKUMA, "G62: mirroring of the axes with a value other than 0";
     }
     rotation: Rotation, "Rotation of coordinates" {
         On = 680 in FHM, "G68: rotation in the plane";
         Tilted = 682 in FH, "G68.2: tilted plane";
         ByTool = 683 in FH, "G68.3: plane normal to the tool axis";
         Off = 690 in FHM, "G69: end of rotation and tilted plane";
+        ShiftAndTurn = 110 in OKUMA, "G11: shift and rotation of coordinates";
+        OffByG10 = 100 in OKUMA, "G10: end of the rotation";
     }
 }
 
@@ -234,6 +254,9 @@ codes! {
         Save = 70 in LINUXCNC, "M70"; Discard = 71 in LINUXCNC, "M71"; Restore = 72 in LINUXCNC, "M72";
         SaveForCall = 73 in LINUXCNC, "M73";
     }
+    return_level: ReturnLevel, "Level to which canned cycles retract" {
+        UpperLimit = 52 in OKUMA, "M52"; Specified = 53 in OKUMA, "M53"; Point = 54 in OKUMA, "M54";
+    }
 }
 
 /// G codes without effect on the motion, in tenths: dialects and the letters of their words.
@@ -242,10 +265,10 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
     (51, FH, "PQRXYZABC"),
     (70, LINUXCNC, ""),
     (80, LINUXCNC, ""),
-    (80, FH, "P"),
+    (80, FH | OKUMA, "P"),
     (110, FH, ""),
-    (220, FH, "XYZIJK"),
-    (230, FH, ""),
+    (220, FH | OKUMA, "XYZIJK"),
+    (230, FH | OKUMA, ""),
     (291, FH | NGC, ""),
     (350, HAAS, ""),
     (401, FH, ""),
@@ -257,6 +280,9 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
     (970, GRBL, ""),
     (1030, HAAS, "P"),
     (1070, HAAS, ""),
+    (1300, OKUMA, ""),
+    (1310, OKUMA, "DEFIJKLPR"),
+    (1320, OKUMA, "DEFIJKLPR"),
     (1870, HAAS, "PEQ"),
     (2540, HAAS, ""),
     (2550, HAAS, ""),
@@ -267,11 +293,6 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
 const REMEDIES: &[(u16, &str)] = &[
     (71, "cylindrical interpolation: program the motions of the axes"),
     (121, "polar coordinate interpolation: program the motions of the axes"),
-    (310, "probing needs a workpiece: skip it with --ignore G31"),
-    (382, "probing needs a workpiece: skip it with --ignore G38.2"),
-    (383, "probing needs a workpiece: skip it with --ignore G38.3"),
-    (384, "probing needs a workpiece: skip it with --ignore G38.4"),
-    (385, "probing needs a workpiece: skip it with --ignore G38.5"),
     (760, "threading on a lathe: no axis of the machine turns the workpiece"),
     (1120, "polar coordinate interpolation: program the motions of the axes"),
     (1410, "3D cutter compensation: program the offset path"),

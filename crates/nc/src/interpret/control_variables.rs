@@ -4,9 +4,13 @@ use virtual_axes_core::units::{DEGREE, MILLIMETER};
 
 use super::codes::{Motion, PlaneCode};
 use super::error::Outcome;
-use super::options::WORK_OFFSET_COUNT;
+use super::okuma::WORK_OFFSETS;
+use super::options::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
 use super::state::{State, is_rotary};
 use crate::motion::{AXIS_COUNT, Plane, ProgramEvent};
+
+/// Number of work coordinate systems.
+const SYSTEMS: usize = WORK_OFFSET_COUNT + ADDITIONAL_OFFSET_COUNT;
 
 /// Quantity that a variable of the control gives access to.
 enum Quantity {
@@ -148,6 +152,10 @@ fn quantity(number: usize) -> Option<Quantity> {
     let tool = |first: usize| (number - first) as u32 + 1;
     match number {
         5221..=5340 => offset(5221, 0),
+        // VZOFX[1] and on.
+        number if (WORK_OFFSETS + 20..WORK_OFFSETS + 20 * (SYSTEMS + 1)).contains(&number) => {
+            offset(WORK_OFFSETS + 20, 0)
+        }
         7001..=7960 => offset(7001, WORK_OFFSET_COUNT),
         14001..=19980 => offset(14001, WORK_OFFSET_COUNT),
         2001..=2200 => Some(Quantity::ToolLength(tool(2001))),

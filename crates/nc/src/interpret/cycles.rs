@@ -2,7 +2,7 @@
 
 use virtual_axes_core::units::MILLIMETER;
 
-use super::codes::{FeedMode, Motion, g_name};
+use super::codes::{FeedMode, Motion, ReturnLevel, g_name};
 use super::dialect::Dialect;
 use super::error::Outcome;
 use super::limits::MAX_PECKS;
@@ -10,6 +10,8 @@ use super::line_words::LineWords;
 use super::state::{Cycle, State};
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, PathControl, ProgramEvent};
 
+/// Milliseconds in a second.
+const MILLISECOND: f64 = 1e-3;
 /// Distance above the last depth to which a peck returns at rapid traverse, as in LinuxCNC, m.
 const CLEARANCE: f64 = 0.254 * MILLIMETER;
 
@@ -57,7 +59,9 @@ impl State {
         let (start, target) = (self.programmed(), self.targets(block)?);
         self.modal.cycle = Some(cycle);
 
-        let mut level = if self.modal.retracts_to_initial { cycle.initial } else { start[drill] };
+        let is_okuma = self.dialect == Dialect::Okuma;
+        let to_initial = self.modal.retracts_to_initial && !is_okuma;
+        let mut level = if to_initial { cycle.initial } else { start[drill] };
         let is_below = is_back_boring(code);
         if level < levels.retract && !is_below {
             level = levels.retract;
@@ -66,8 +70,21 @@ impl State {
             }
         }
         let path_control = std::mem::replace(&mut self.modal.path_control, PathControl::ExactPath);
-        let returns = self.modal.retracts_to_initial || is_below;
-        let levels = Levels { clear: if returns { level } else { levels.retract }, ..levels };
+        let clear = match self.modal.return_level {
+            _ if to_initial || is_below => level,
+            (ReturnLevel::Specified, Some(specified)) if is_okuma => specified.max(levels.retract),
+            (ReturnLevel::UpperLimit, _) if is_okuma && self.options.upper_limits[drill].is_finite() => {
+                self.options.upper_limits[drill] - self.origin(drill)
+            }
+            _ => levels.retract,
+        };
+        let levels = Levels { clear, ..levels };
+        if is_okuma && repeats == 0 {
+            // NCYL moves to the hole.
+            let mut end = target;
+            end[drill] = level;
+            self.rapid_to(&end)?;
+        }
         for repeat in 0..repeats {
             let mut end = self.programmed();
             if repeat == 0 || self.modal.is_incremental {
@@ -126,7 +143,9 @@ impl State {
             Motion::DwellDrilling | Motion::DwellBoring | Motion::StopBoring | Motion::ManualBoring
         );
         if (has_dwell || !is_linuxcnc || is_tapping(cycle.code)) && block.get('P').is_some() {
-            cycle.dwell = self.dwell_time(block)?;
+            let is_ms = self.dialect == Dialect::Okuma && !block.has_point('P');
+            let dwell = self.dwell_time(block)?;
+            cycle.dwell = if is_ms { dwell.map(|dwell| dwell * MILLISECOND) } else { dwell };
         }
         if is_linuxcnc && matches!(cycle.code, Motion::DwellDrilling | Motion::DwellBoring) {
             cycle.dwell.ok_or_else(|| format!("{name} requires P, the dwell in s"))?;
@@ -294,7 +313,15 @@ fn has_pecks(code: Motion) -> bool {
 }
 
 fn is_tapping(code: Motion) -> bool {
-    matches!(code, Motion::Tapping | Motion::LeftTapping | Motion::Tapping184 | Motion::LeftTapping174)
+    matches!(
+        code,
+        Motion::Tapping
+            | Motion::LeftTapping
+            | Motion::Tapping184
+            | Motion::LeftTapping174
+            | Motion::Tapping284
+            | Motion::LeftTapping274
+    )
 }
 
 fn is_back_boring(code: Motion) -> bool {

@@ -1,13 +1,15 @@
 //! Dialects of G code, and their detection from the content of a program.
 
 use std::fmt;
-use std::io::{BufRead, Read, Seek, SeekFrom};
+use std::io::{BufRead, Seek, SeekFrom};
 use std::str::FromStr;
+
+use super::encoding::Encoding;
 
 /// Bytes at the start of a program in which its dialect is detected.
 const DETECTION_BYTES: usize = 1 << 20;
 /// Longest line in which evidence is searched, bytes.
-const LINE_BYTES: u64 = 4096;
+const LINE_BYTES: usize = 4096;
 /// Points from which a dialect is detected.
 const ENOUGH: u32 = 3;
 
@@ -27,12 +29,14 @@ pub enum Dialect {
     Grbl,
     /// Mach3 and Mach4.
     Mach3,
+    /// Okuma: milling programs of OSP controls.
+    Okuma,
 }
 
 impl Dialect {
     /// All dialects.
-    pub const ALL: [Self; 6] =
-        [Self::LinuxCnc, Self::Fanuc, Self::Haas, Self::Sinumerik, Self::Grbl, Self::Mach3];
+    pub const ALL: [Self; 7] =
+        [Self::LinuxCnc, Self::Fanuc, Self::Haas, Self::Sinumerik, Self::Grbl, Self::Mach3, Self::Okuma];
 
     /// Returns the name, as in `--dialect`.
     pub fn name(self) -> &'static str {
@@ -43,6 +47,7 @@ impl Dialect {
             Self::Sinumerik => "sinumerik",
             Self::Grbl => "grbl",
             Self::Mach3 => "mach3",
+            Self::Okuma => "okuma",
         }
     }
 
@@ -51,9 +56,9 @@ impl Dialect {
         1 << self as u8
     }
 
-    /// Returns true for Fanuc and Haas: macro B, dwells in ms, subprograms after M30.
+    /// Returns true for Fanuc and Haas, with macro B, and for Okuma, whose lines are translated to it.
     pub(super) fn has_macro_b(self) -> bool {
-        matches!(self, Self::Fanuc | Self::Haas)
+        matches!(self, Self::Fanuc | Self::Haas | Self::Okuma)
     }
 }
 
@@ -96,9 +101,9 @@ impl DetectedDialect {
     pub fn of<R: BufRead + Seek>(source: &mut R) -> Self {
         let mut scores: [Score; Dialect::ALL.len()] = Default::default();
         let (mut bytes, mut line) = (0, Vec::new());
+        let encoding = Encoding::of(source.fill_buf().unwrap_or_default());
         for number in 1.. {
-            line.clear();
-            let read = source.by_ref().take(LINE_BYTES).read_until(b'\n', &mut line).unwrap_or(0);
+            let read = encoding.read_line(source, LINE_BYTES, &mut line).unwrap_or(0);
             bytes += read;
             if read == 0 || bytes > DETECTION_BYTES {
                 break;
@@ -119,20 +124,47 @@ impl DetectedDialect {
 }
 
 /// Returns true for a text of which at least half of the lines are words of G code, and one is at all.
+/// Programs of other controls, whose format an error names, are such a text too.
 pub fn is_g_code(head: &[u8]) -> bool {
+    let encoding = Encoding::of(head);
+    let (mut rest, mut line) = (head, Vec::new());
     let (mut words, mut others) = (0, 0);
-    for line in head.split(|byte| *byte == b'\n') {
-        let line = String::from_utf8_lossy(line).trim().to_ascii_uppercase();
+    while encoding.read_line(&mut rest, LINE_BYTES, &mut line).is_ok_and(|read| read > 0) {
+        let line = String::from_utf8_lossy(&line).trim().to_ascii_uppercase();
+        if foreign_format(&line).is_some() {
+            return true;
+        }
         let code = code_of(&line);
         if code.is_empty() || code.starts_with('%') {
             continue;
         }
-        let mut letters = code.trim_start_matches('/').chars();
-        let is_word = letters.next().is_some_and(|letter| "GMNXYZTFSO#:".contains(letter))
-            && letters.next().is_some_and(|next| next.is_ascii_digit() || "+-.<[=".contains(next));
-        *(if is_word { &mut words } else { &mut others }) += 1;
+        *(if is_word_line(&line) { &mut words } else { &mut others }) += 1;
     }
     words > 0 && words >= others
+}
+
+/// Returns true for a line in upper case that begins with a word of G code.
+pub(super) fn is_word_line(line: &str) -> bool {
+    let code = code_of(line);
+    let mut letters = code.trim_start_matches('/').chars();
+    letters.next().is_some_and(|letter| "GMNXYZTFSO#:".contains(letter))
+        && letters.next().is_some_and(|next| next.is_ascii_digit() || "+-.<[=".contains(next))
+}
+
+/// Returns the name of the format that a line in upper case shows, if it is no G code of a supported dialect.
+pub(super) fn foreign_format(line: &str) -> Option<&'static str> {
+    const APT: [&str; 8] =
+        ["PARTNO", "TOOL PATH/", "MULTAX/", "LOADTL/", "CUTTER/", "GOTO/", "MACHIN/", "TLDATA/"];
+    let text = line.trim_start_matches(|letter: char| letter.is_ascii_digit() || letter == ' ');
+    if text.starts_with("BEGIN PGM") {
+        return Some("a conversational program of Heidenhain (Klartext)");
+    }
+    if APT.iter().any(|word| text.starts_with(word)) {
+        return Some("a cutter location file (APT, CLS)");
+    }
+    let is_iso =
+        line.starts_with('%') && line.ends_with('*') && (line.contains(" G71") || line.contains(" G70"));
+    is_iso.then_some("a program of Heidenhain in DIN/ISO")
 }
 
 /// Evidence for one dialect.
@@ -152,6 +184,7 @@ pub(super) const HAAS: u8 = 1 << Dialect::Haas as u8;
 const SINUMERIK: u8 = 1 << Dialect::Sinumerik as u8;
 pub(super) const GRBL: u8 = 1 << Dialect::Grbl as u8;
 pub(super) const MACH3: u8 = 1 << Dialect::Mach3 as u8;
+pub(super) const OKUMA: u8 = 1 << Dialect::Okuma as u8;
 
 /// Bits of all dialects.
 pub(super) const ALL: u8 = u8::MAX;
@@ -173,9 +206,19 @@ enum Pattern {
     OWord,
     /// Assignment to a name or address: `X=`, `R1=`.
     Assignment,
+    /// Head `$NAME.MIN%` of a file.
+    Head,
+    /// Word with another letter in the line: `G15` with H.
+    Pair(&'static str, char),
+    /// Condition that a line follows: `IF [VC1 EQ 1] N10`.
+    ConditionalLine,
+    /// Common variable: `VC1`, `VC[1]`.
+    CommonVariable,
 }
 
-use Pattern::{Assignment, Code, Comment, OWord, ProgramNumber, Start, Word};
+use Pattern::{
+    Assignment, Code, Comment, CommonVariable, ConditionalLine, Head, OWord, Pair, ProgramNumber, Start, Word,
+};
 
 /// Evidence: dialects as bits, points, and the text.
 const RULES: &[(u8, u32, Pattern)] = &[
@@ -265,6 +308,20 @@ const RULES: &[(u8, u32, Pattern)] = &[
     (MACH3, 6, Comment("MACH3")),
     (MACH3, 6, Comment("MACH2")),
     (MACH3, 6, Comment("MACH4")),
+    (OKUMA, 12, Head),
+    (OKUMA, 8, Pair("G15", 'H')),
+    (OKUMA, 6, Pair("G16", 'H')),
+    (OKUMA, 4, Pair("G56", 'H')),
+    (OKUMA, 4, Pair("G116", 'T')),
+    (OKUMA, 4, Pair("G111", 'T')),
+    (OKUMA, 16, ConditionalLine),
+    (OKUMA, 16, CommonVariable),
+    (OKUMA, 6, Code("NCYL")),
+    (OKUMA, 6, Code("VTLCN")),
+    (OKUMA, 6, Start("MODIN")),
+    (OKUMA, 6, Start("CALLO")),
+    (OKUMA, 4, Start("RTS")),
+    (OKUMA, 6, Comment("OKUMA")),
 ];
 
 /// Lines at the start of a program whose comments are evidence.
@@ -302,6 +359,10 @@ impl Pattern {
             ProgramNumber => found(is_program_number(code), "the program number O"),
             OWord => found(is_o_word(code), "an O-word"),
             Assignment => found(has_assignment(code), "an assignment with ="),
+            Head => found(code.starts_with('$') && code.ends_with('%'), "the head $"),
+            Pair(word, letter) => found(has_word(code, word) && code.contains(letter), word),
+            ConditionalLine => found(code.contains("IF[") && code.contains("]N"), "IF with a line"),
+            CommonVariable => found(has_common_variable(code), "a variable VC"),
         }
     }
 }
@@ -350,6 +411,14 @@ fn is_o_word(code: &str) -> bool {
     rest.starts_with('<') || (keyword.len() < rest.len() && is_keyword)
 }
 
+/// Returns true for `VC1` and `VC[1]`.
+fn has_common_variable(code: &str) -> bool {
+    code.match_indices("VC").any(|(at, _)| {
+        code[at + 2..].starts_with(|next: char| next.is_ascii_digit() || next == '[')
+            && !code[..at].ends_with(|before: char| before.is_ascii_alphabetic() || before == '_')
+    })
+}
+
 fn has_assignment(code: &str) -> bool {
     code.match_indices('=').any(|(at, _)| {
         let before = &code[..at];
@@ -385,6 +454,9 @@ mod tests {
             ("$H\nG21\nG0 X1\n", ("grbl", Some(1))),
             ("(post: grbl)\nG0 X1\n", ("grbl", Some(1))),
             ("(Mach3 mill)\nG0 X1\n", ("mach3", Some(1))),
+            ("$PART.MIN%\nG0 X1\n", ("okuma", Some(1))),
+            ("O1001\nG15 H1\nG56 Z10. H1\n", ("okuma", Some(2))),
+            ("IF [VC1 EQ 2] N10\nX=VC2\n", ("okuma", Some(1))),
             ("#100=ACOS[0.5]\n#101=[#100*2]\nG0 X#101\n", ("linuxcnc", None)),
         ] {
             assert_eq!(detected(text), expected, "{text:?}");
@@ -394,10 +466,10 @@ mod tests {
     #[test]
     fn names_of_dialects_are_read_without_regard_to_case() {
         assert_eq!("Haas".parse(), Ok(Dialect::Haas));
-        let error = "okuma".parse::<Dialect>().unwrap_err();
+        let error = "heidenhain".parse::<Dialect>().unwrap_err();
         assert_eq!(
             error,
-            "okuma: not a dialect; must be one of linuxcnc, fanuc, haas, sinumerik, grbl, mach3"
+            "heidenhain: not a dialect; must be one of linuxcnc, fanuc, haas, sinumerik, grbl, mach3, okuma"
         );
     }
 }

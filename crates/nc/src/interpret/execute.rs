@@ -5,7 +5,8 @@ use virtual_axes_core::units::{DEGREE, MILLIMETER, RPM};
 
 use super::codes::{
     Action, ArcDistance, Codes, Coolant, Distance, FeedMode, Motion, PathControlCode, PlaneCode, Retraction,
-    SavedModes, Spindle, SpindleMode, SpindleWithCoolant, Stop, ToolChange, ToolLength, Units, g_name,
+    SavedModes, Spindle, SpindleMode, SpindleWithCoolant, Stop, ToolChange, ToolLength, Units, WorkSystem,
+    g_name,
 };
 use super::contour::Corner;
 use super::dialect::Dialect;
@@ -13,7 +14,7 @@ use super::error::Outcome;
 use super::line_words::{LineWords, Setting};
 use super::parameters::{FIRST_OF_CONTROL, FIRST_VARIABLE_OF_CONTROL};
 use super::state::{Modal, State};
-use crate::motion::{AXIS_COUNT, Blend, PathControl, Plane, ProgramEvent};
+use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Blend, PathControl, Plane, ProgramEvent};
 
 /// Millimeters in an inch.
 const INCH: f64 = 25.4 * MILLIMETER;
@@ -65,6 +66,7 @@ impl State {
         self.set_compensation(block, &codes)?;
         self.set_tool_length(block, &codes)?;
         self.switch_kinematics(&codes)?;
+        let before = (self.offsets.active, self.modal.is_machine);
         self.set_coordinate_system(block, &codes)?;
         self.set_path_control(block, &codes)?;
         self.save_modes(&codes);
@@ -79,6 +81,9 @@ impl State {
         let steps = self.steps.len();
         let result = self.act(block, &codes);
         self.modal.path_control = path_control;
+        if codes.g.work_system == Some(WorkSystem::Once) {
+            (self.offsets.active, self.modal.is_machine) = before;
+        }
         result?;
         self.corner = None;
         if self.steps.len() > steps {
@@ -93,7 +98,7 @@ impl State {
         block.require_used()
     }
 
-    fn set_parameters(&mut self, block: &mut LineWords) -> Outcome<()> {
+    pub(super) fn set_parameters(&mut self, block: &mut LineWords) -> Outcome<()> {
         for (target, value) in block.settings.drain(..) {
             match target {
                 Setting::Number(0) => return Err("#0 has no value and cannot be set".to_owned()),
@@ -123,6 +128,10 @@ impl State {
             (self.modal.feed_word, self.modal.feed) = (0.0, None);
         }
         self.modal.feed_mode = mode;
+        if codes.g.action == Some(Action::Dwell) && self.dialect == Dialect::Okuma {
+            // F is the dwell.
+            return Ok(());
+        }
         if let Some(feed) = block.take_rate('F')? {
             let units = if mode == FeedMode::InverseTime { [1.0; 2] } else { [self.modal.length, DEGREE] };
             self.modal.feed_word = feed;
@@ -150,7 +159,8 @@ impl State {
             self.modal.selected_tool = tool;
             self.push_event(ProgramEvent::ToolSelection(tool));
         }
-        match codes.m.tool_change {
+        let of_macro = matches!(codes.g.action, Some(Action::ToolChange111 | Action::ToolChange116));
+        match codes.m.tool_change.or(of_macro.then_some(ToolChange::Change)) {
             Some(ToolChange::Change) => {
                 self.modal.tool = self.modal.selected_tool;
                 self.push_event(ProgramEvent::ToolChange(self.modal.tool));
@@ -220,6 +230,11 @@ impl State {
             let time = block.take_rate('X')?;
             return Ok(time.or(block.take_rate('U')?));
         }
+        if self.dialect == Dialect::Okuma
+            && let Some(time) = block.take_rate('F')?
+        {
+            return Ok(Some(time));
+        }
         let has_point = block.has_point('P');
         let Some(value) = block.take_rate('P')? else {
             return if is_ngc { Ok(None) } else { Ok(Some(0.0)) };
@@ -284,6 +299,9 @@ impl State {
             codes.g.arc_distance.map_or(*has_absolute_centers, |code| code == ArcDistance::Absolute);
         *retracts_to_initial =
             codes.g.retraction.map_or(*retracts_to_initial, |code| code == Retraction::ToInitial);
+        if let Some(level) = codes.m.return_level {
+            self.modal.return_level.0 = level;
+        }
     }
 
     /// Saves, restores or discards the modes: M70 to M73.
@@ -315,6 +333,7 @@ impl State {
                 | Action::ToSecondReference
                 | Action::FromReference
                 | Action::ReferenceCheck
+                | Action::ReturnLevel
                 | Action::Shift
                 | Action::ShiftToPosition),
             ) => Some(code.number()),
@@ -329,9 +348,16 @@ impl State {
             let [code, motion] = [code, motion.number()].map(g_name);
             return Err(format!("{code} and {motion} both use the axis words: program them in two lines"));
         }
-        let mut is_machine = false;
+        let mut is_machine = self.modal.is_machine;
         match codes.g.action {
-            None | Some(Action::Dwell | Action::MacroCall) => {}
+            None
+            | Some(Action::Dwell | Action::MacroCall | Action::ToolChange111 | Action::ToolChange116) => {}
+            Some(Action::ReturnLevel) => {
+                let drill = self.modal.plane.axes()[2];
+                let level = block.take(AXIS_LETTERS[drill]).map(|level| level * self.modal.length);
+                self.modal.return_level.1 =
+                    Some(level.ok_or("G71 requires the level of retraction, as in G71 Z50")?);
+            }
             Some(Action::MachineCoordinates) => is_machine = true,
             Some(Action::Data) => self.set_data(block)?,
             Some(Action::ToReference) => self.go_to_reference(block, 0)?,

@@ -1,5 +1,6 @@
 //! Values of words: numbers, parameters, expressions and functions, in degrees and the units of the program.
 
+use super::dialect::Dialect;
 use super::error::Outcome;
 use super::limits::{MAX_NAME, MAX_NESTING};
 use super::parameters::parameter_number;
@@ -117,6 +118,11 @@ impl<'a> Scanner<'a> {
     /// Reads the value of a setting; of macro B an expression without brackets.
     pub(super) fn setting_value(&mut self) -> Outcome<f64> {
         if self.has_macro_b() { self.operations(1) } else { self.value() }
+    }
+
+    /// Returns true for translated lines of Okuma.
+    pub(super) fn is_okuma(&self) -> bool {
+        self.state.dialect == Dialect::Okuma
     }
 
     fn has_macro_b(&self) -> bool {

@@ -10,6 +10,7 @@ use super::expression::Scanner;
 use super::files::subprogram_file;
 use super::limits::{MAX_BLOCKS, MAX_CALLS, MAX_SUBPROGRAMS};
 use super::o_words::{BlockKind, Call, Flow, Keyword, OpenBlock, Statement, is_o_word};
+use super::okuma::line_name;
 use super::parameters::{LOCALS, integer};
 use super::source::Place;
 use super::state::Jump;
@@ -85,6 +86,11 @@ impl<R: BufRead + Seek> Interpreter<R> {
                 let (program, times) = self.repeated_program(program, times)?;
                 self.call(&program.to_string(), None, times)
             }
+            Some(Jump::Macro { program, arguments, .. })
+                if is_probing(program) && self.subprogram(&program.to_string()).is_err() =>
+            {
+                self.state.probing_macro(program, &arguments)
+            }
             Some(Jump::Macro { program, times, arguments }) => {
                 self.call(&program.to_string(), Some(*arguments), times)
             }
@@ -102,6 +108,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
                     blocks: Vec::new(),
                 })
             }
+            Some(Jump::Named { program }) => self.call(&program, None, 1),
             Some(Jump::Goto { number }) => {
                 let place = self.numbered_line(number)?;
                 self.source.jump(place)
@@ -176,7 +183,8 @@ impl<R: BufRead + Seek> Interpreter<R> {
             is_first &= line.text.is_empty() || is_o_word(&line.text);
         };
         self.source.jump(here)?;
-        let place = found.ok_or_else(|| format!("N{number}: no such line in the program that runs"))?;
+        let place =
+            found.ok_or_else(|| format!("N{}: no such line in the program that runs", line_name(number)))?;
         if self.flow.numbered.len() < MAX_SUBPROGRAMS {
             self.flow.numbered.insert((section, number), place);
         }
@@ -186,7 +194,11 @@ impl<R: BufRead + Seek> Interpreter<R> {
     /// Returns an error if loops, conditions or calls are open at the end of the file.
     pub(super) fn require_closed(&self) -> Outcome<()> {
         if let Some(call) = self.flow.calls.last() {
-            let end = if call.is_by_number { "M99" } else { "endsub" };
+            let end = match (call.is_by_number, self.state.dialect) {
+                (true, Dialect::Okuma) => "RTS",
+                (true, _) => "M99",
+                _ => "endsub",
+            };
             return Err(format!("subprogram O{} without {end}", call.label));
         }
         match self.flow.blocks.last() {
@@ -365,7 +377,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
     }
 
     /// Calls a subprogram with its own local parameters, or by M98 with those of the caller.
-    fn call(&mut self, label: &str, arguments: Option<[f64; LOCALS]>, times: u32) -> Outcome<()> {
+    pub(super) fn call(&mut self, label: &str, arguments: Option<[f64; LOCALS]>, times: u32) -> Outcome<()> {
         let entry = self.subprogram(label)?;
         let is_by_number = arguments.is_none() || self.state.dialect.has_macro_b();
         if self.flow.calls.len() >= MAX_CALLS {
@@ -475,6 +487,11 @@ impl<R: BufRead + Seek> Interpreter<R> {
         self.source.jump(here)?;
         Ok(found)
     }
+}
+
+/// Returns true for the numbers of the probing macros of Renishaw and Haas.
+fn is_probing(program: u32) -> bool {
+    matches!(program, 9800..=9899 | 9023 | 9995)
 }
 
 fn too_deep(label: &str) -> String {

@@ -42,6 +42,13 @@ impl State {
                 block.skip("XYZABC");
                 self.modal.frames[MIRROR] = CoordinateFrame::identity();
             }
+            Some(Scaling::MirrorByFlags) => {
+                // R rounds corners.
+                block.skip("R");
+                let factors =
+                    self.center(block)?.map(|flag| if flag.unwrap_or(0.0) == 0.0 { 1.0 } else { -1.0 });
+                self.modal.frames[MIRROR] = CoordinateFrame::scaling(Vector3::from(factors));
+            }
             Some(Scaling::Mirror | Scaling::Mirror101) => {
                 let center = self.center(block)?;
                 let factors = center.map(|center| if center.is_some() { -1.0 } else { 1.0 });
@@ -52,12 +59,22 @@ impl State {
         }
         match codes.g.rotation {
             None => {}
-            Some(Rotation::Off) => {
+            Some(Rotation::ShiftAndTurn) => {
+                let shift = Vector3::from(self.center(block)?.map(Option::unwrap_or_default));
+                let angle = block.take('P').unwrap_or(0.0).to_radians();
+                let turned = CoordinateFrame::rotation(self.modal.plane.axes()[2], angle);
+                self.modal.frames[ROTATION] = CoordinateFrame::shift(shift).then(&turned);
+            }
+            Some(Rotation::Off | Rotation::OffByG10) => {
                 self.modal.frames[ROTATION] = CoordinateFrame::identity();
                 self.tilt = None;
             }
             Some(Rotation::On) => self.modal.frames[ROTATION] = self.rotation(block)?,
-            Some(Rotation::Tilted) => self.tilt = Some(self.tilted(block)?),
+            Some(Rotation::Tilted) => {
+                if let Some(plane) = self.tilted(block)? {
+                    self.tilt = Some(plane);
+                }
+            }
             Some(Rotation::ByTool) => self.tilt = Some(self.tilted_by_tool(block)?),
         }
         let [scaling, mirror, rotation] = &self.modal.frames;
@@ -123,19 +140,49 @@ impl State {
         Ok(CoordinateFrame::rotation(normal, angle).about(center))
     }
 
-    /// Returns the plane of G68.2: origin X Y Z, and Euler angles I about Z, J about X, K about Z.
-    fn tilted(&mut self, block: &mut LineWords) -> Outcome<CoordinateFrame> {
-        if block.take_integer('P')?.is_some_and(|method| method != 0) {
-            return Err("G68.2 is supported with Euler angles I J K only, without P".to_owned());
-        }
-        block.skip("Q");
-        let origin = Vector3::from(self.center(block)?.map(Option::unwrap_or_default));
-        let [i, j, k] = ['I', 'J', 'K'].map(|letter| block.take(letter).unwrap_or(0.0).to_radians());
+    /// Returns the plane of G68.2, or `None` before the last line of a plane by points or vectors. P is the method: 0 Euler
+    /// angles I about Z, J about X, K about Z; 1 roll, pitch and yaw I, J, K about X, Y, Z of the work coordinate system, in
+    /// the order Q; 2 three points; 3 two vectors; 4 projection angles.
+    fn tilted(&mut self, block: &mut LineWords) -> Outcome<Option<CoordinateFrame>> {
+        let method = block.take_integer('P')?.unwrap_or(0);
+        let number = block.take_integer('Q')?;
+        let given = self.center(block)?;
+        let origin = Vector3::from(given.map(Option::unwrap_or_default));
+        let words = ['I', 'J', 'K'].map(|letter| block.take(letter).unwrap_or(0.0));
+        let turn = block.take('R').unwrap_or(0.0).to_radians();
+        let angles = words.map(f64::to_radians);
+        let rotation = CoordinateFrame::rotation;
+        let turned = match method {
+            0 => rotation(2, angles[0]).then(&rotation(0, angles[1])).then(&rotation(2, angles[2])),
+            1 => roll_pitch_yaw(number.unwrap_or(123), angles)?,
+            2 | 3 => {
+                let number = number.unwrap_or(1) as usize;
+                let vector = Vector3::from(words);
+                let entry =
+                    if method == 2 { [origin, Vector3::new(turn, 0.0, 0.0)] } else { [origin, vector] };
+                let last = if method == 2 { 3 } else { 2 };
+                let entries = &mut self.modal.plane_points;
+                *entries.get_mut(number).filter(|_| number <= last).ok_or_else(|| {
+                    format!("G68.2 P{method} Q{number} is invalid: Q1 to Q{last} are the lines of the plane")
+                })? = Some(entry);
+                let found = if method == 2 { plane_of_points(entries)? } else { plane_of_vectors(entries)? };
+                if found.is_some() {
+                    *entries = [None; 4];
+                    self.tilt = None;
+                }
+                return Ok(found);
+            }
+            4 => {
+                let ([sin_i, cos_i], [sin_j, cos_j]) =
+                    ([angles[0].sin(), angles[0].cos()], [angles[1].sin(), angles[1].cos()]);
+                let first = Vector3::new(cos_i, 0.0, -sin_i);
+                let plane = plane_of(Vector3::zeros(), first, first.cross(&Vector3::new(0.0, cos_j, sin_j)))?;
+                plane.then(&rotation(2, angles[2]))
+            }
+            _ => return Err(format!("G68.2 P{method} is not supported: P0 to P4 are")),
+        };
         self.tilt = None;
-        let turned = CoordinateFrame::rotation(2, i)
-            .then(&CoordinateFrame::rotation(0, j))
-            .then(&CoordinateFrame::rotation(2, k));
-        Ok(CoordinateFrame::shift(origin).then(&turned))
+        Ok(Some(CoordinateFrame::shift(origin).then(&turned)))
     }
 
     /// Returns the plane normal to the tool axis: G68.3.
@@ -187,4 +234,41 @@ impl State {
         let (sin, cos) = angle.to_radians().sin_cos();
         (end[first], end[second]) = (*radius * cos, *radius * sin);
     }
+}
+
+/// Returns rotations about the axes X, Y and Z of the work coordinate system, in the order of the digits of `order`.
+fn roll_pitch_yaw(order: u32, angles: [f64; 3]) -> Outcome<CoordinateFrame> {
+    let axes = [order / 100, order / 10 % 10, order % 10];
+    let mut sorted = axes;
+    sorted.sort_unstable();
+    if sorted != [1, 2, 3] {
+        return Err(format!("G68.2 P1 Q{order} is invalid: Q is the order of the rotations, 123 to 321"));
+    }
+    Ok(axes.into_iter().fold(CoordinateFrame::identity(), |turned, axis| {
+        let axis = axis as usize - 1;
+        CoordinateFrame::rotation(axis, angles[axis]).then(&turned)
+    }))
+}
+
+/// Returns the plane of three points: origin, a point on X and one on the side of Y; line 0 shifts and turns it.
+fn plane_of_points(entries: &[Option<[Vector3<f64>; 2]>; 4]) -> Outcome<Option<CoordinateFrame>> {
+    let [shift, Some([origin, _]), Some([on_x, _]), Some([beside, _])] = entries else { return Ok(None) };
+    let first = on_x - origin;
+    let plane = plane_of(*origin, first, first.cross(&(beside - origin)))?;
+    let Some([shift, turn]) = shift else { return Ok(Some(plane)) };
+    Ok(Some(plane.then(&CoordinateFrame::shift(*shift)).then(&CoordinateFrame::rotation(2, turn.x))))
+}
+
+/// Returns the plane of an origin with the direction of X, and the direction of Z.
+fn plane_of_vectors(entries: &[Option<[Vector3<f64>; 2]>; 4]) -> Outcome<Option<CoordinateFrame>> {
+    let [_, Some([origin, first]), Some([_, normal]), _] = entries else { return Ok(None) };
+    plane_of(*origin, *first, *normal).map(Some)
+}
+
+/// Returns the plane with a direction of X and a normal; the part of X along the normal has no effect.
+fn plane_of(origin: Vector3<f64>, first: Vector3<f64>, normal: Vector3<f64>) -> Outcome<CoordinateFrame> {
+    let invalid = || "G68.2: points on a line, or vectors of the same direction, give no plane".to_owned();
+    let normal = normal.try_normalize(1e-12).ok_or_else(invalid)?;
+    let x = (first - normal * first.dot(&normal)).try_normalize(1e-12).ok_or_else(invalid)?;
+    Ok(CoordinateFrame { linear: Matrix3::from_columns(&[x, normal.cross(&x), normal]), origin })
 }

@@ -21,6 +21,13 @@ impl IgnoredCodes {
         self.patterns.iter().any(|pattern| pattern.matches('G', u32::from(code), &g_name(code)))
     }
 
+    /// Returns true for the name of a subprogram of Sinumerik.
+    pub(super) fn has_name(&self, name: &str) -> bool {
+        self.patterns
+            .iter()
+            .any(|pattern| matches!(pattern, CodePattern::Name(_)) && pattern.matches(' ', 0, name))
+    }
+
     /// Returns true for an M code.
     pub(super) fn has_m(&self, code: u32) -> bool {
         let name = || u16::try_from(code).map_or_else(|_| format!("M{code}"), m_name);
@@ -77,6 +84,16 @@ impl FromStr for CodePattern {
         // A number alone is an M code.
         let name =
             if upper.starts_with(|first: char| first.is_ascii_digit()) { format!("M{upper}") } else { upper };
+        // Subprograms of Sinumerik: L9010, TOOLCHECK.
+        let mut letters = name.bytes();
+        let is_subprogram = match (letters.next(), letters.next()) {
+            (Some(b'L'), Some(b'0'..=b'9')) => true,
+            (Some(first @ b'A'..=b'Z'), Some(b'A'..=b'Z' | b'_')) => !matches!(first, b'G' | b'M'),
+            _ => false,
+        };
+        if is_subprogram && letters.all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'*')) {
+            return Ok(Self::Name(name));
+        }
         let letter = name.chars().next().filter(|letter| matches!(letter, 'G' | 'M')).ok_or_else(invalid)?;
         if name.contains(['X', '*']) {
             let is_valid =

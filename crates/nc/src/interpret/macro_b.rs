@@ -3,10 +3,12 @@
 use std::io::{BufRead, Seek};
 
 use super::Interpreter;
+use super::dialect::Dialect;
 use super::error::Outcome;
 use super::expression::Scanner;
 use super::limits::MAX_SUBPROGRAMS;
 use super::o_words::is_o_word;
+use super::okuma::{self, NamedStatement};
 use super::parameters::integer;
 use super::source::Place;
 use super::state::Jump;
@@ -17,6 +19,11 @@ const WITHOUT_EFFECT: [&str; 5] = ["popen", "pclos", "dprnt", "bprnt", "setvn"];
 impl<R: BufRead + Seek> Interpreter<R> {
     /// Executes the statement of macro B in the line at `place`; returns false if the line has words.
     pub(super) fn execute_statement(&mut self, place: Place) -> Outcome<bool> {
+        if self.state.dialect == Dialect::Okuma
+            && let Some(statement) = okuma::statement(&self.line.text)
+        {
+            return self.execute_okuma(statement).map(|()| true);
+        }
         let text = &self.line.text;
         if text.starts_with(b"if") {
             self.execute_if()?;
@@ -50,6 +57,38 @@ impl<R: BufRead + Seek> Interpreter<R> {
         Ok(true)
     }
 
+    /// Executes a statement of Okuma.
+    fn execute_okuma(&mut self, statement: NamedStatement) -> Outcome<()> {
+        match statement {
+            NamedStatement::Call(program, from) => {
+                let times = self.read_arguments(from)?;
+                if times > 0 {
+                    self.call(&program, None, times)?;
+                }
+            }
+            NamedStatement::ModalCall(program, from) => {
+                self.read_arguments(from)?;
+                self.state.modal_macro = Some((Jump::Named { program }, self.state.calls));
+            }
+            NamedStatement::ModalEnd => self.state.modal_macro = None,
+            NamedStatement::Return => {
+                self.state.jump = Some(Jump::Return { number: None });
+                self.execute_jump()?;
+            }
+            NamedStatement::WithoutEffect(name) => self.state.note_without_effect(name),
+        }
+        Ok(())
+    }
+
+    /// Sets the variables of a call, and returns its repetitions Q.
+    fn read_arguments(&mut self, from: usize) -> Outcome<u32> {
+        self.block.read(self.line.text.get(from..).unwrap_or_default(), &self.state)?;
+        self.state.set_parameters(&mut self.block)?;
+        let times = self.block.take_integer('Q')?;
+        self.block.require_used()?;
+        Ok(times.unwrap_or(1))
+    }
+
     /// Executes `IF [condition] GOTO n` or `IF [condition] THEN words`.
     fn execute_if(&mut self) -> Outcome<()> {
         let mut scanner = Scanner::new(&self.line.text, &self.state);
@@ -78,6 +117,9 @@ impl<R: BufRead + Seek> Interpreter<R> {
 
     /// Executes the words after the number of a program: `O1000 G21`.
     fn execute_program_number(&mut self) -> Outcome<bool> {
+        if self.state.dialect == Dialect::Okuma {
+            return Ok(true);
+        }
         let text = &self.line.text;
         let end = text.iter().skip(1).position(|byte| !byte.is_ascii_digit());
         match end.map(|end| end + 1) {

@@ -12,6 +12,7 @@ mod contour_steps;
 mod control_variables;
 mod cycles;
 mod dialect;
+mod encoding;
 mod error;
 mod execute;
 mod expression;
@@ -26,6 +27,7 @@ mod macro_b;
 mod moves;
 mod o_words;
 mod offsets;
+mod okuma;
 mod options;
 mod parameters;
 mod pocket;
@@ -55,7 +57,7 @@ use self::error::Outcome;
 use self::line_words::LineWords;
 use self::o_words::{Flow, is_o_word};
 use self::sinumerik::Sinumerik;
-use self::source::LineSource;
+use self::source::{LineSource, SourceHead};
 use self::state::State;
 use self::text::LineText;
 use crate::motion::{Coordinates, ProgramStep};
@@ -74,11 +76,14 @@ pub struct Interpreter<R> {
     dialect: DetectedDialect,
     /// Front end of native Sinumerik programs.
     sinumerik: Sinumerik,
+    /// Format of another control, which is not supported.
+    foreign: Option<&'static str>,
 }
 
 impl<R: BufRead + Seek> Interpreter<R> {
     /// Creates the interpreter of the program in `source`, from its start; `name` is the file in messages.
     pub fn new(mut source: R, name: &str, mut options: InterpreterOptions) -> Self {
+        let foreign = SourceHead::of(&mut source).foreign;
         let dialect = match options.dialect {
             Some(dialect) => DetectedDialect { dialect, evidence: None },
             None => DetectedDialect::of(&mut source),
@@ -95,6 +100,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
             block: LineWords::default(),
             state,
             flow: Flow::default(),
+            foreign,
         }
     }
 
@@ -176,6 +182,11 @@ impl<R: BufRead + Seek> Interpreter<R> {
     }
 }
 
+fn foreign_reason(format: &str) -> String {
+    let dialects = Dialect::ALL.map(Dialect::name).join(", ");
+    format!("{format} is not supported: post the program again as G code, in one of the dialects {dialects}")
+}
+
 impl<R: BufRead + Seek> Iterator for Interpreter<R> {
     type Item = Result<ProgramStep, ProgramError>;
 
@@ -187,6 +198,14 @@ impl<R: BufRead + Seek> Iterator for Interpreter<R> {
             }
             if self.state.has_ended {
                 return None;
+            }
+            if let Some(format) = self.foreign.take() {
+                self.state.has_ended = true;
+                return Some(Err(ProgramError {
+                    name: self.name.clone(),
+                    line: 1,
+                    reason: foreign_reason(format),
+                }));
             }
             let line = self.execute_line();
             let at_file = |reason: String| match self.source.line_of_file() {

@@ -5,11 +5,12 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 use virtual_axes_core::units::{DEGREE, MINUTE, RPM};
 
-use super::codes::{FeedMode, Motion};
+use super::codes::{FeedMode, Motion, g_name};
 use super::dialect::Dialect;
 use super::error::Outcome;
 use super::limits::{MAX_ANGLE, MAX_LENGTH};
 use super::line_words::LineWords;
+use super::parameters::LOCALS;
 use super::state::{State, is_rotary};
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates, Feed, MotionKind, PlanarArc, ProgramMotion};
 
@@ -62,6 +63,9 @@ impl State {
             Motion::Line => {
                 let end = self.targets(block)?;
                 self.line_to(&end)
+            }
+            Motion::Skip | Motion::Probe382 | Motion::Probe383 | Motion::Probe384 | Motion::Probe385 => {
+                self.probe(block, code)
             }
             Motion::Synchronous | Motion::SynchronousTapping => self.synchronous(block, code),
             Motion::ClockwiseArc => self.arc(block, true),
@@ -149,6 +153,46 @@ impl State {
         tcp_length.map_or(Ok(()), |length| self.enter_tcp(length))
     }
 
+    /// Executes a probing motion: a straight line to its end, where nothing is touched.
+    fn probe(&mut self, block: &mut LineWords, code: Motion) -> Outcome<()> {
+        block.skip("PQ");
+        let name = g_name(code.number());
+        self.assume(format!("{name}: a straight line to its end, nothing is touched"));
+        let end = self.targets(block)?;
+        self.line_to(&end)?;
+        // The position of the touch.
+        for axis in 0..AXIS_COUNT {
+            self.parameters.set_of_control(5061 + axis, self.coordinate(axis))?;
+        }
+        self.parameters.set_of_control(5070, 1.0)?;
+        if code == Motion::Skip {
+            self.modal.motion = Some(Motion::Line);
+        }
+        Ok(())
+    }
+
+    /// Executes a macro of the control for probing that the program lacks. P9810 moves to a point, the others have no motion.
+    pub(super) fn probing_macro(&mut self, program: u32, arguments: &[f64; LOCALS]) -> Outcome<()> {
+        let argument = |number: usize| Some(arguments[number - 1]).filter(|value| !value.is_nan());
+        if program != 9810 {
+            self.assume(format!("G65 P{program}: macro of the control for probing, without motion"));
+            return Ok(());
+        }
+        self.assume("G65 P9810: a straight line to its end, nothing is touched".to_owned());
+        if let Some(feed) = argument(9) {
+            self.modal.feed_word = feed;
+            self.modal.feed = Some([feed * self.modal.length, feed * DEGREE]);
+        }
+        let mut end = self.programmed();
+        for (end, number) in end.iter_mut().zip(24..27) {
+            *end = argument(number).map_or(*end, |value| value * self.modal.length);
+        }
+        match self.modal.feed {
+            Some(_) => self.line_to(&end),
+            None => self.rapid_to(&end),
+        }
+    }
+
     /// Executes a straight line with a pitch per revolution: G33 K, or G33.1 K to a point and back.
     fn synchronous(&mut self, block: &mut LineWords, code: Motion) -> Outcome<()> {
         let pitch = block.take('K').filter(|pitch| *pitch > 0.0);
@@ -227,7 +271,18 @@ impl State {
     }
 
     /// Appends a rapid traverse to the steps.
-    pub(super) fn push_rapid(&mut self, end: Coordinates) -> Outcome<()> {
+    pub(super) fn push_rapid(&mut self, mut end: Coordinates) -> Outcome<()> {
+        if self.dialect == Dialect::Okuma && self.modal.tcp_length.is_none() {
+            for (axis, limit) in self.options.upper_limits.into_iter().enumerate().take(3) {
+                if end[axis] > limit {
+                    end[axis] = limit;
+                    self.assume(format!(
+                        "G0 beyond the upper travel limit of {}: the axis stops there, as on the control",
+                        AXIS_LETTERS[axis]
+                    ));
+                }
+            }
+        }
         self.push_motion(MotionKind::Rapid, end, Feed::Rapid)
     }
 

@@ -115,6 +115,10 @@ impl Scanner<'_> {
     pub(super) fn statement(&mut self) -> Outcome<Statement> {
         let text = self.rest();
         self.skip("o");
+        if self.is_okuma() {
+            let label = self.rest().to_lowercase();
+            return Ok(Statement { label, keyword: Keyword::Program });
+        }
         let label = match self.peek() {
             Some(b'<') => self.name()?.to_owned(),
             Some(b'0'..=b'9') => self.digits()?.to_string(),

@@ -19,6 +19,9 @@ impl State {
 
     /// Selects the work coordinate system: G54 to G59.3, G54.1 P, G154 P, G110 to G129, and G59 P of Mach3.
     pub(super) fn set_coordinate_system(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
+        if codes.g.work_system.is_some() {
+            return self.select_system(block);
+        }
         let Some(code) = codes.g.coordinates else { return Ok(()) };
         let of_code = block.g.iter().find(|code| (1100..=1290).contains(*code)).map(|code| code / 10 - 109);
         let is_additional = code.index().is_none();
@@ -40,6 +43,25 @@ impl State {
                 ));
             }
         };
+        self.note_missing_offset();
+        Ok(())
+    }
+
+    /// Selects the work coordinate system of G15 H and G16 H; H0 is that of the machine.
+    fn select_system(&mut self, block: &mut LineWords) -> Outcome<()> {
+        const LAST: usize = WORK_OFFSET_COUNT + ADDITIONAL_OFFSET_COUNT;
+        let number = block.take_integer('H')?.map(|number| number as usize).filter(|number| *number <= LAST);
+        let number =
+            number.ok_or_else(|| format!("G15 and G16 require H, the work coordinate system 0 to {LAST}"))?;
+        self.modal.is_machine = number == 0;
+        if let Some(index) = number.checked_sub(1) {
+            self.offsets.active = index;
+            self.note_missing_offset();
+        }
+        Ok(())
+    }
+
+    fn note_missing_offset(&mut self) {
         if let Some(given) = &self.options.given_work_offsets
             && !given.contains(&self.offsets.active)
         {
@@ -48,7 +70,6 @@ impl State {
                 system_name(self.offsets.active)
             ));
         }
-        Ok(())
     }
 
     /// Returns the axis words in m and rad, which then count as used.
@@ -227,7 +248,7 @@ impl State {
     pub(super) fn set_tool_length(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
         let Some(code) = codes.g.tool_length else { return Ok(()) };
         match code {
-            ToolLength::Off => {
+            ToolLength::Off | ToolLength::OffByG53 | ToolLength::CenterPointOff => {
                 self.leave_tcp();
                 self.offsets.tool_length = 0.0;
                 block.take_integer('H')?;
@@ -247,7 +268,10 @@ impl State {
                 };
                 self.leave_tcp();
                 match code {
-                    ToolLength::CenterPoint | ToolLength::CenterPointVector | ToolLength::CenterPoint234 => {
+                    ToolLength::CenterPoint
+                    | ToolLength::CenterPointVector
+                    | ToolLength::CenterPoint234
+                    | ToolLength::CenterPoint169 => {
                         self.enter_tcp(length)?;
                         self.modal.has_tool_vectors = code == ToolLength::CenterPointVector;
                     }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use nalgebra::Matrix3;
-use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::config::{MachineConfig, PartProgramConfig};
 use virtual_axes_core::kinematics::{Kinematics, ToolPose};
 
 use super::dialect::Dialect;
@@ -12,6 +12,7 @@ use super::error::Outcome;
 use super::ignored::IgnoredCodes;
 use super::limits::REPEATED_LINES;
 use super::tools::ToolTable;
+use super::work_offset::WorkOffset;
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Blend, Coordinates, PathControl};
 
 /// Number of work coordinate systems with codes of their own: G54 to G59.3.
@@ -30,6 +31,8 @@ pub struct InterpreterOptions {
     pub work_offsets: Vec<Coordinates>,
     /// Indices of the work offsets that are given; `None` if none is an assumption.
     pub given_work_offsets: Option<BTreeSet<usize>>,
+    /// Upper travel limits, at which rapid traverses of Okuma end, m and rad.
+    pub upper_limits: Coordinates,
     /// Axis positions of G28 and G30, m and rad.
     pub references: [Coordinates; 2],
     /// Dialect; `None` detects it from the content of the program.
@@ -66,6 +69,7 @@ impl Default for InterpreterOptions {
             start: [0.0; AXIS_COUNT],
             work_offsets: vec![[0.0; AXIS_COUNT]; WORK_OFFSET_COUNT + ADDITIONAL_OFFSET_COUNT],
             given_work_offsets: None,
+            upper_limits: [f64::INFINITY; AXIS_COUNT],
             references: [[0.0; AXIS_COUNT]; 2],
             dialect: None,
             tools: ToolTable::default(),
@@ -94,8 +98,10 @@ impl InterpreterOptions {
         let geometry = *machine.kinematics();
         let transform = TipTransform::new(machine);
         let mut options = Self { axes: [false; AXIS_COUNT], ..Self::default() };
-        for axis in transform.joints.iter().flatten() {
+        for (axis, joint) in transform.joints.iter().zip(machine.axes()) {
+            let Some(axis) = axis else { continue };
             options.axes[*axis] = true;
+            options.upper_limits[*axis] = joint.limits().travel_max;
         }
         for offset in &mut options.work_offsets {
             offset[..3].copy_from_slice(&geometry.workpiece);
@@ -104,6 +110,47 @@ impl InterpreterOptions {
         options.default_tool_length = Some(geometry.tool_length);
         options.kinematics = Some(transform);
         options
+    }
+
+    /// Sets dialect, work offsets, tools and times to those of a machine file.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error with the parameter whose text is invalid, or with the file that cannot be read.
+    pub fn with_setup(mut self, setup: &PartProgramConfig) -> Result<Self, String> {
+        let of = |key: &str, error: &str| format!("part_program.{key}: {error}");
+        if let Some(name) = &setup.dialect {
+            self.dialect = Some(name.parse().map_err(|error: String| of("dialect", &error))?);
+        }
+        for text in setup.work_offsets.iter().flatten() {
+            self.set_work_offset(&text.parse().map_err(|error: String| of("work_offsets", &error))?);
+        }
+        let mut tools = match &setup.tool_table {
+            Some(path) => ToolTable::from_file(path).map_err(|error| of("tool_table", &error))?,
+            None => ToolTable::default(),
+        };
+        if let Some(lines) = &setup.tools {
+            tools.replace_with(ToolTable::parse(&lines.join("\n")).map_err(|error| of("tools", &error))?);
+        }
+        self.set_tools(tools);
+        (self.tool_change_time, self.spindle_time) = (setup.tool_change_time, setup.spindle_time);
+        Ok(self)
+    }
+
+    /// Sets a work offset, which counts as given.
+    pub(crate) fn set_work_offset(&mut self, WorkOffset { index, coordinates }: &WorkOffset) {
+        self.work_offsets[*index] = *coordinates;
+        if let Some(given) = &mut self.given_work_offsets {
+            given.insert(*index);
+        }
+    }
+
+    /// Sets the tools; with any, a tool that is missing has the length 0. Without one, nothing changes.
+    pub(crate) fn set_tools(&mut self, tools: ToolTable) {
+        if !tools.is_empty() {
+            self.tools = tools;
+            self.default_tool_length = Some(0.0);
+        }
     }
 
     /// Sets the axis positions at the program start to `joints`, m and rad, in the order of the machine of

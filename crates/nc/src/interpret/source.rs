@@ -1,7 +1,9 @@
 //! Lines of a program, with bounded memory and a bounded number of repetitions.
 
-use std::io::{BufRead, Cursor, Read, Seek, SeekFrom};
+use std::io::{BufRead, Cursor, Seek, SeekFrom};
 
+use super::dialect::{foreign_format, is_word_line};
+use super::encoding::Encoding;
 use super::error::Outcome;
 use super::limits::{MAX_IDLE_LINES, MAX_LINE};
 
@@ -24,13 +26,55 @@ impl Place {
     pub(super) const START: Self = Self { file: 0, offset: 0, lines: 0 };
 }
 
+/// Lines at the start of a file in which its head is searched.
+const HEAD_LINES: usize = 200;
+
+/// Encoding, start and format of a file by its first lines.
+#[derive(Debug)]
+pub(super) struct SourceHead {
+    encoding: Encoding,
+    /// Line of the first percent sign, if only a text without words stands before it.
+    start: Place,
+    /// Format of another control.
+    pub foreign: Option<&'static str>,
+}
+
+impl SourceHead {
+    /// Reads the first lines of a file, and returns to its start.
+    pub(super) fn of<R: BufRead + Seek>(reader: &mut R) -> Self {
+        let encoding = Encoding::of(reader.fill_buf().unwrap_or_default());
+        let mut head = Self { encoding, start: Place::START, foreign: None };
+        let (mut offset, mut line) = (0, Vec::new());
+        for lines in 0..HEAD_LINES {
+            let read = encoding.read_line(reader, MAX_LINE, &mut line).unwrap_or(0);
+            if read == 0 {
+                break;
+            }
+            let text = String::from_utf8_lossy(&line).trim().to_ascii_uppercase();
+            head.foreign = foreign_format(&text);
+            if text.starts_with('%') && !text.starts_with("%_N_") && head.foreign.is_none() {
+                head.start = Place { offset, lines, ..Place::START };
+                break;
+            }
+            if head.foreign.is_some() || is_word_line(&text) {
+                break;
+            }
+            offset += read as u64;
+        }
+        // An error of the operating system occurs again with the first line.
+        let _ = reader.seek(SeekFrom::Start(0));
+        head
+    }
+}
+
 /// Source of lines.
 #[derive(Debug)]
 pub(super) struct LineSource<R> {
     reader: R,
     next: Place,
     /// Files of subprograms: text, and its place that is read next.
-    files: Vec<Cursor<Vec<u8>>>,
+    files: Vec<(Cursor<Vec<u8>>, Encoding)>,
+    encoding: Encoding,
     /// Line of the program that was read last, from 1.
     program_line: usize,
     /// End of the farthest line that was read, bytes.
@@ -47,11 +91,15 @@ pub(super) struct LineSource<R> {
 }
 
 impl<R: BufRead + Seek> LineSource<R> {
-    pub(super) fn new(reader: R, repeated_lines: u64) -> Self {
-        let next = Place::START;
+    pub(super) fn new(mut reader: R, repeated_lines: u64) -> Self {
+        let SourceHead { encoding, start, .. } = SourceHead::of(&mut reader);
+        // An error of the operating system occurs again with the first line.
+        let is_there = reader.seek(SeekFrom::Start(start.offset)).is_ok();
+        let next = if is_there { start } else { Place::START };
         Self {
             reader,
             next,
+            encoding,
             files: Vec::new(),
             program_line: 1,
             farthest: 0,
@@ -78,7 +126,8 @@ impl<R: BufRead + Seek> LineSource<R> {
         if self.files.len() >= MAX_FILES {
             return Err(format!("the program calls more than {MAX_FILES} files"));
         }
-        self.files.push(Cursor::new(text));
+        let encoding = Encoding::of(&text);
+        self.files.push((Cursor::new(text), encoding));
         Ok(Place { file: self.files.len(), ..Place::START })
     }
 
@@ -91,7 +140,7 @@ impl<R: BufRead + Seek> LineSource<R> {
     pub(super) fn jump(&mut self, place: Place) -> Outcome<()> {
         let start = SeekFrom::Start(place.offset);
         match place.file.checked_sub(1).and_then(|index| self.files.get_mut(index)) {
-            Some(file) => file.seek(start),
+            Some((file, _)) => file.seek(start),
             None => self.reader.seek(start),
         }
         .map_err(|error| error.to_string())?;
@@ -153,11 +202,10 @@ impl<R: BufRead + Seek> LineSource<R> {
     /// Reads the next line without counting repetitions; returns false at the end of the program.
     pub(super) fn read_raw(&mut self, line: &mut Vec<u8>) -> Outcome<bool> {
         loop {
-            line.clear();
-            let limit = MAX_LINE as u64 + 2;
+            let limit = MAX_LINE + 2;
             let read = match self.next.file.checked_sub(1).and_then(|index| self.files.get_mut(index)) {
-                Some(file) => file.take(limit).read_until(b'\n', line),
-                None => self.reader.by_ref().take(limit).read_until(b'\n', line),
+                Some((file, encoding)) => encoding.read_line(file, limit, line),
+                None => self.encoding.read_line(&mut self.reader, limit, line),
             }
             .map_err(|error| error.to_string())?;
             if read == 0 {
@@ -169,9 +217,6 @@ impl<R: BufRead + Seek> LineSource<R> {
             if file == 0 {
                 self.program_line = lines + 1;
             }
-            while matches!(line.last(), Some(b'\n' | b'\r')) {
-                line.pop();
-            }
             if line.len() > MAX_LINE {
                 return Err(format!("the line is longer than {MAX_LINE} bytes"));
             }
@@ -179,6 +224,11 @@ impl<R: BufRead + Seek> LineSource<R> {
                 line.drain(..3);
             }
             let text = line.trim_ascii();
+            // Head of a file of Okuma.
+            if !self.has_text && text.starts_with(b"$") && text.ends_with(b"%") {
+                self.has_text = true;
+                continue;
+            }
             // A percent sign encloses the program: before its first line with text, which may follow it, and after its
             // last. Heads %_N_ of Sinumerik are lines.
             if let Some(rest) = text.strip_prefix(b"%")

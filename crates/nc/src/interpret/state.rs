@@ -6,11 +6,12 @@ use nalgebra::{Matrix3, Vector3};
 use virtual_axes_core::text::escaped;
 use virtual_axes_core::units::{DEGREE, MILLIMETER};
 
-use super::codes::{FeedMode, Motion, PlaneCode};
+use super::codes::{FeedMode, Motion, PlaneCode, ReturnLevel};
 use super::contour::{Contour, Corner};
 use super::dialect::Dialect;
 use super::error::Outcome;
 use super::frame::CoordinateFrame;
+use super::okuma;
 use super::options::InterpreterOptions;
 use super::parameters::{FIRST_OF_CONTROL, FIRST_VARIABLE_OF_CONTROL, LOCALS, ParameterValues};
 use super::report::{InterpretationReport, count};
@@ -77,6 +78,8 @@ pub(super) enum Jump {
     Return { number: Option<u32> },
     /// GOTO.
     Goto { number: u32 },
+    /// MODIN of Okuma: subprogram by name.
+    Named { program: String },
 }
 
 /// Offsets between programmed coordinates and the position, m and rad.
@@ -131,10 +134,16 @@ pub(super) struct Modal {
     pub polar: Option<[f64; 2]>,
     /// Parts of the programmable frame: scaling (G51), mirroring (G51.1), rotation (G68).
     pub frames: [CoordinateFrame; 3],
+    /// Lines of a plane by points or vectors (G68.2 P2, P3) before its last one, by Q: a point, m, and a vector or angle.
+    pub plane_points: [Option<[Vector3<f64>; 2]>; 4],
     /// Programmed point of the last G28, m and rad.
     pub between: Coordinates,
     /// True with constant surface speed (G96).
     pub has_surface_speed: bool,
+    /// True if coordinates are axis positions (G15 H0 of Okuma).
+    pub is_machine: bool,
+    /// Level to which canned cycles of Okuma retract, and the one of G71, m.
+    pub return_level: (ReturnLevel, Option<f64>),
 }
 
 /// Canned cycle with the words that stay in effect for its next lines.
@@ -187,8 +196,11 @@ impl State {
             radius_number: None,
             polar: None,
             frames: [CoordinateFrame::identity(); 3],
+            plane_points: [None; 4],
             between: [0.0; AXIS_COUNT],
             has_surface_speed: false,
+            is_machine: false,
+            return_level: (ReturnLevel::Point, None),
         };
         let none = [0.0; AXIS_COUNT];
         Self {
@@ -427,6 +439,14 @@ impl State {
     /// Returns the value of `#<name>`.
     pub(super) fn named(&self, name: &str) -> Outcome<f64> {
         let value = self.control_name(name).or_else(|| self.parameters.named(name));
+        if let (None, Some(name)) = (value, name.strip_prefix(okuma::PREFIX))
+            && self.dialect == Dialect::Okuma
+        {
+            // Variables of the control begin with V.
+            let missing =
+                || format!("{}: the variable has no value: set it before it is used", name.to_uppercase());
+            return name.starts_with('v').then_some(0.0).ok_or_else(missing);
+        }
         value.ok_or_else(|| format!("#<{name}> has no value: set it before it is used"))
     }
 

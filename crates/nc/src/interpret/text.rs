@@ -4,6 +4,7 @@ use virtual_axes_core::text::escaped;
 
 use super::dialect::Dialect;
 use super::error::Outcome;
+use super::okuma;
 
 /// Line of a program without comments and blanks.
 #[derive(Debug, Default)]
@@ -35,6 +36,12 @@ impl LineText {
         let mut rest = self.raw.iter().copied().enumerate();
         while let Some((index, byte)) = rest.next() {
             match byte {
+                // Blanks end the names and expressions of Okuma.
+                b' ' | b'\t' if dialect == Dialect::Okuma => {
+                    if !matches!(self.text.last(), None | Some(b' ')) {
+                        self.text.push(b' ');
+                    }
+                }
                 b' ' | b'\t' => {}
                 // Control characters of serial lines.
                 0..b' ' | 0x7f => {}
@@ -57,7 +64,9 @@ impl LineText {
                     }
                 }
                 b'\'' if dialect == Dialect::Mach3 => break,
-                b':' if dialect.has_macro_b() && self.text.is_empty() => self.text.push(b'o'),
+                b':' if matches!(dialect, Dialect::Fanuc | Dialect::Haas) && self.text.is_empty() => {
+                    self.text.push(b'o')
+                }
                 b'!'..=b'~' => self.text.push(byte.to_ascii_lowercase()),
                 _ => {
                     return Err(format!(
@@ -66,6 +75,10 @@ impl LineText {
                     ));
                 }
             }
+        }
+        if dialect == Dialect::Okuma {
+            self.number = okuma::translate(&mut self.text)?;
+            return Ok(());
         }
         self.remove_number()
     }
@@ -87,7 +100,7 @@ impl LineText {
 
     /// Returns true if the text so far is at most a line number.
     fn is_before_words(&self) -> bool {
-        match self.text.split_first() {
+        match self.text.trim_ascii_end().split_first() {
             None => true,
             Some((b'n', digits)) => digits.iter().all(u8::is_ascii_digit),
             Some(_) => false,

@@ -1,11 +1,16 @@
 //! Tool table: numbers, names, lengths and radii; files of LinuxCNC and CSV files.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
 
 use virtual_axes_core::units::MILLIMETER;
 
 /// Largest number of tools in a table.
 const MAX_TOOLS: usize = 100_000;
+/// Longest file, bytes.
+const MAX_TABLE: u64 = 1 << 24;
 /// Largest length and radius, m.
 const MAX_SIZE: f64 = 100.0;
 
@@ -46,6 +51,26 @@ impl ToolTable {
     /// Returns the tool with a number for a change, which is added if it is missing.
     pub(super) fn entry(&mut self, number: u32) -> &mut Tool {
         self.tools.entry(number).or_default()
+    }
+
+    /// Adds the tools of another table, which replace those of the same number.
+    pub(super) fn replace_with(&mut self, other: Self) {
+        self.tools.extend(other.tools);
+    }
+
+    /// Reads a file with a tool table of LinuxCNC or a CSV table, see [`parse`](Self::parse).
+    ///
+    /// # Errors
+    ///
+    /// Returns an error with the file, if it cannot be read, is longer than 16 MiB, or contains an invalid entry.
+    pub fn from_file(path: &Path) -> Result<Self, String> {
+        let mut text = String::new();
+        let name = path.display();
+        let read = File::open(path).and_then(|file| file.take(MAX_TABLE + 1).read_to_string(&mut text));
+        match read.map_err(|error| format!("{name}: {error}"))? as u64 > MAX_TABLE {
+            true => Err(format!("{name}: the table is longer than {MAX_TABLE} bytes")),
+            false => Self::parse(&text).map_err(|error| format!("{name}: {error}")),
+        }
     }
 
     /// Returns the number of tools.

@@ -7,4 +7,6 @@ mod worst_lines;
 
 pub use setpoints::{OverrideSchedule, PartProgramOptions, PartProgramSource, ProgramTrack};
 pub use survey::ProgramSurvey;
-pub use worst_lines::{Cause, CycleError, LineErrors, ProgramFigures, WorstLine, line_texts};
+pub use worst_lines::{
+    Cause, CycleError, LineErrors, ProgramFigures, ProgrammedErrors, WorstLine, line_texts,
+};

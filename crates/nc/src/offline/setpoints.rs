@@ -3,7 +3,8 @@
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
-use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::config::{MachineConfig, PartProgramConfig};
+use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::text::BuiltinFiles;
 use virtual_axes_core::trajectory::PathPlace;
 use virtual_axes_core::trial::{GridSource, SourceError};
@@ -15,7 +16,7 @@ use crate::interpret::{
     Occurrences, ProgramError, ToolTable, WorkOffset,
 };
 use crate::motion::{Blend, PathControl, ProgramEvent, ProgramStep};
-use crate::plan::{FeedPlanError, PartProgramPlanner, PlanOptions};
+use crate::plan::{FeedPlanError, PartProgramPlanner, PlanOptions, ProgrammedPath};
 
 /// Hour, s.
 const HOUR: f64 = 3600.0;
@@ -76,40 +77,41 @@ impl OverrideSchedule {
 pub struct PartProgramOptions {
     /// Feed override.
     pub schedule: OverrideSchedule,
-    /// Dialect; `None` detects it.
+    /// Dialect; `None` for that of the machine, or the detected one.
     pub dialect: Option<Dialect>,
     /// Codes without effect.
     pub ignored: IgnoredCodes,
-    /// Work offsets that are given.
+    /// Work offsets in place of those of the machine.
     pub work_offsets: Vec<WorkOffset>,
-    /// Tool table; empty for tools of the length of the machine.
+    /// Tool table; empty for the tools of the machine.
     pub tools: ToolTable,
-    /// Duration of a tool change (M6), s.
-    pub tool_change_time: f64,
-    /// Duration of a change of the spindle speed (M3, M4, M5, S), s.
-    pub spindle_time: f64,
+    /// Duration of a tool change (M6), s; `None` for that of the machine.
+    pub tool_change_time: Option<f64>,
+    /// Duration of a change of the spindle speed (M3, M4, M5, S), s; `None` for that of the machine.
+    pub spindle_time: Option<f64>,
     /// Options of the feed planner.
     pub plan: PlanOptions,
 }
 
 impl PartProgramOptions {
-    /// Returns the options of the interpreter for a machine.
-    pub fn interpreter(&self, machine: &MachineConfig) -> InterpreterOptions {
-        let mut options = InterpreterOptions::for_machine(machine);
-        options.dialect = self.dialect;
+    /// Returns the options of the interpreter for a machine: those of the machine file, where none are given.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the machine file has an invalid work offset, tool or tool table.
+    pub fn interpreter(&self, machine: &MachineConfig) -> Result<InterpreterOptions, String> {
+        let setup = machine.part_program();
+        // A tool table replaces that of the machine file, which is not read then.
+        let without_tools = || PartProgramConfig { tools: None, tool_table: None, ..setup.clone() };
+        let setup = if self.tools.is_empty() { setup.clone() } else { without_tools() };
+        let mut options = InterpreterOptions::for_machine(machine).with_setup(&setup)?;
+        options.dialect = self.dialect.or(options.dialect);
         options.ignored.clone_from(&self.ignored);
-        options.tools.clone_from(&self.tools);
-        if !self.tools.is_empty() {
-            options.default_tool_length = Some(0.0);
-        }
-        for WorkOffset { index, coordinates } in &self.work_offsets {
-            options.work_offsets[*index] = *coordinates;
-            if let Some(given) = &mut options.given_work_offsets {
-                given.insert(*index);
-            }
-        }
-        (options.tool_change_time, options.spindle_time) = (self.tool_change_time, self.spindle_time);
-        options
+        options.set_tools(self.tools.clone());
+        self.work_offsets.iter().for_each(|offset| options.set_work_offset(offset));
+        options.tool_change_time = self.tool_change_time.unwrap_or(options.tool_change_time);
+        options.spindle_time = self.spindle_time.unwrap_or(options.spindle_time);
+        Ok(options)
     }
 }
 
@@ -118,6 +120,8 @@ impl PartProgramOptions {
 pub struct ProgramTrack {
     /// Places of the setpoints in order.
     pub setpoints: VecDeque<PathPlace>,
+    /// Programmed path of these setpoints and beyond.
+    pub programmed: ProgrammedPath,
     /// Time from the first to the last setpoint, s.
     pub cycle_time: f64,
     /// Duration of all motions at their programmed feed, s.
@@ -191,6 +195,7 @@ impl Iterator for NotedSteps<'_> {
 /// Source of the setpoints of a part program.
 pub struct PartProgramSource<'a> {
     planner: PartProgramPlanner<'a>,
+    kinematics: Kinematics,
     name: &'a str,
     schedule: &'a OverrideSchedule,
     track: &'a RefCell<ProgramTrack>,
@@ -216,13 +221,16 @@ impl<'a> PartProgramSource<'a> {
     ) -> Result<Self, String> {
         let file = open_program(name, builtin).map_err(|error| format!("{name}: {error}"))?;
         let subprogram_folder = program_folder(name, builtin);
-        let interpreter = InterpreterOptions { subprogram_folder, ..options.interpreter(machine) };
+        let interpreter = options.interpreter(machine).map_err(|error| format!("{name}: {error}"))?;
+        let interpreter = InterpreterOptions { subprogram_folder, ..interpreter };
         track.replace(ProgramTrack::default());
         let interpreter = Interpreter::new(file, name, interpreter);
-        let planner = PartProgramPlanner::new(NotedSteps { interpreter, track }, machine, options.plan)
+        let mut planner = PartProgramPlanner::new(NotedSteps { interpreter, track }, machine, options.plan)
             .map_err(|error| format!("{name}: {error}"))?;
+        planner.keep_programmed_path();
         Ok(Self {
             planner,
+            kinematics: Kinematics::new(machine),
             name,
             schedule: &options.schedule,
             track,
@@ -271,6 +279,7 @@ impl GridSource for PartProgramSource<'_> {
             return Err(self.too_long());
         }
         let Some(setpoint) = setpoint else { return Ok(false) };
+        self.planner.take_programmed_path(&self.kinematics, &mut track.programmed);
         row.copy_from_slice(setpoint.psec());
         self.is_rapid = setpoint.place.programmed_feed.is_infinite();
         track.setpoints.push_back(setpoint.place);

@@ -75,7 +75,7 @@ impl ProgramSurvey {
         let options = InterpreterOptions {
             reports_all_errors: true,
             subprogram_folder: program_folder(name, builtin),
-            ..options.interpreter(machine)
+            ..options.interpreter(machine).map_err(|error| format!("{name}: {error}"))?
         };
         let transform = TipTransform::new(machine);
         let start = transform.joints(&options.start, None);

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use virtual_axes_core::assess::StandingTurn;
 use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_core::kinematics::{Kinematics, ToolPose};
+use virtual_axes_core::statistics::rms_of_sum;
 use virtual_axes_core::text::BuiltinFiles;
 use virtual_axes_core::trajectory::PathPlace;
 use virtual_axes_core::trial::Tick;
@@ -14,6 +15,7 @@ use virtual_axes_core::units::{Nanoseconds, seconds};
 
 use super::setpoints::ProgramTrack;
 use crate::builtin::open_program;
+use crate::plan::{ProgrammedCorner, ProgrammedPath};
 
 /// Number of lines reported.
 const COUNT: usize = 10;
@@ -22,6 +24,13 @@ const WINDOW: usize = 112;
 /// Position cycles before and after the nearest setpoint that explain an error.
 const BEFORE: usize = 16;
 const AFTER: usize = 16;
+/// Length of the programmed path that is kept before the window of setpoints, m.
+const KEPT_PATH: f64 = 0.05;
+/// Distance behind a corner, as a multiple of the distance from it and in addition, m, at which it is passed.
+const CORNER_REACH: f64 = 4.0;
+const CORNER_MARGIN: f64 = 1e-4;
+/// Distance before a corner from which on it is followed, m.
+const CORNER_AHEAD: f64 = 0.01;
 /// Smallest step of a setpoint that counts as motion, m or rad.
 const RESOLUTION: f64 = 1e-8;
 /// Change of direction in one step that is a reversal of the path, rad.
@@ -69,14 +78,56 @@ pub struct WorstLine {
     pub line: usize,
     /// Text of the line.
     pub text: String,
-    /// Contour error, m.
+    /// Contour error against the programmed path, m.
     pub error: f64,
+    /// Share of blending at that time, m: distance of the planned path from the programmed path.
+    pub blending: f64,
+    /// Share of the drives at that time, m: distance of the tool tip from the planned path.
+    pub drives: f64,
     /// Largest orientation error on the line, rad: angle between the tool axis and that of the nearest setpoint.
     pub orientation: f64,
     /// Time of the contour error, s.
     pub time: f64,
     /// Cause of the error.
     pub cause: Cause,
+}
+
+/// Contour errors against the programmed path, at position cycles.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ProgrammedErrors {
+    /// Largest contour error, m.
+    pub max: f64,
+    /// RMS contour error, m.
+    pub rms: f64,
+    /// Largest share of blending, m: distance of the planned path from the programmed path.
+    pub blending: f64,
+    /// Largest share of the drives, m: distance of the tool tip from the planned path.
+    pub drives: f64,
+}
+
+/// Sums of contour errors.
+#[derive(Debug, Clone, Copy, Default)]
+struct ErrorSums {
+    largest: ProgrammedErrors,
+    sum_of_squares: f64,
+    count: u64,
+}
+
+impl ErrorSums {
+    fn add(&mut self, cycle: &CycleError) {
+        let CycleError { contour_error, blending, drives, .. } = *cycle;
+        let largest = &mut self.largest;
+        largest.max = largest.max.max(contour_error);
+        largest.blending = largest.blending.max(blending);
+        largest.drives = largest.drives.max(drives);
+        self.sum_of_squares += contour_error * contour_error;
+        self.count += 1;
+    }
+
+    fn figures(&self) -> Option<ProgrammedErrors> {
+        let rms = rms_of_sum(self.sum_of_squares, self.count)?;
+        Some(ProgrammedErrors { rms, ..self.largest })
+    }
 }
 
 /// Times and worst lines of a part program.
@@ -86,6 +137,10 @@ pub struct ProgramFigures {
     pub cycle_time: f64,
     /// Duration of all motions at their programmed feed, s.
     pub programmed_time: f64,
+    /// Contour errors of motions at feed; `None` without any.
+    pub cuts: Option<ProgrammedErrors>,
+    /// Contour errors at rapid traverse; `None` without any.
+    pub rapids: Option<ProgrammedErrors>,
     /// Lines with the largest contour errors of motions at feed, the largest first.
     pub worst_lines: Vec<WorstLine>,
     /// Lines with the largest contour errors at rapid traverse, the largest first.
@@ -101,7 +156,7 @@ pub struct CycleError {
     pub line: usize,
     /// Simulated tool tip in the workpiece frame, m.
     pub tip: [f64; 3],
-    /// Nearest point of the path, m.
+    /// Nearest point of the programmed path, m.
     pub reference: [f64; 3],
     /// Path position of the nearest setpoint from the start of the program, m.
     pub path_position: f64,
@@ -109,8 +164,32 @@ pub struct CycleError {
     pub programmed_feed: f64,
     /// Speed of the simulated tool tip, m/s.
     pub reached_feed: f64,
-    /// Contour error, m.
+    /// Contour error against the programmed path, m.
     pub contour_error: f64,
+    /// Distance of the planned path from the programmed path, m.
+    pub blending: f64,
+    /// Distance of the tool tip from the planned path, m.
+    pub drives: f64,
+    /// True at rapid traverse.
+    pub is_rapid: bool,
+}
+
+/// Corner of the programmed path that is being passed.
+#[derive(Debug, Clone)]
+struct PassedCorner {
+    corner: ProgrammedCorner,
+    /// Smallest distance of the planned path, m.
+    planned: f64,
+    /// Smallest distance of the tool tip, m, with that position cycle and the number of its setpoint.
+    nearest: Option<(f64, CycleError, usize)>,
+}
+
+impl PassedCorner {
+    /// Returns true if the path has moved away from the corner.
+    fn is_passed(&self, path_position: f64) -> bool {
+        let reach = self.planned.max(self.nearest.map_or(0.0, |(distance, ..)| distance));
+        path_position > self.corner.path_position + CORNER_REACH * reach + CORNER_MARGIN
+    }
 }
 
 /// Setpoint with its line.
@@ -122,8 +201,9 @@ struct TrackedSetpoint {
     tip_feed: f64,
 }
 
-/// Contour and orientation errors by source line: distance of the simulated tool tip from the polyline of the setpoints'
-/// tips, and angle between the tool axes at the nearest point, at each position cycle.
+/// Contour and orientation errors by source line: distance of the simulated tool tip from the programmed path, and angle
+/// between the tool axes at the nearest point of the polyline of setpoints, at each position cycle. The planned path is that
+/// polyline.
 pub struct LineErrors {
     kinematics: Kinematics,
     names: Vec<String>,
@@ -135,6 +215,11 @@ pub struct LineErrors {
     /// delayed by α.
     poses: VecDeque<(ToolPose, Nanoseconds, ToolPose)>,
     turn: StandingTurn,
+    programmed: ProgrammedPath,
+    /// Corners that are being passed.
+    corners: VecDeque<PassedCorner>,
+    /// Contour errors of motions at feed and at rapid traverse.
+    sums: [ErrorSums; 2],
     /// Number of setpoints before the window.
     passed: usize,
     /// Worst lines of motions at feed and at rapid traverse, with the number of their nearest setpoint until the cause is
@@ -159,6 +244,9 @@ impl LineErrors {
             poses: VecDeque::new(),
             passed: 0,
             turn: StandingTurn::default(),
+            programmed: ProgrammedPath::default(),
+            corners: VecDeque::new(),
+            sums: Default::default(),
             worst: Default::default(),
             last_tip: None,
             last_line: (0, 0.0),
@@ -172,6 +260,7 @@ impl LineErrors {
         if !tick.position_instant {
             return None;
         }
+        self.programmed.append(&mut track.programmed);
         let samples = || tick.machine.axes().iter().map(|axis| axis.sample());
         let joints: Vec<f64> = samples().map(|sample| sample.psec).collect();
         let start = PathPlace { programmed_feed: f64::INFINITY, ..PathPlace::default() };
@@ -188,7 +277,9 @@ impl LineErrors {
         if self.window.len() > WINDOW {
             self.window.pop_front();
             self.passed += 1;
+            self.programmed.drop_before(self.window[0].place.path_position - KEPT_PATH);
         }
+        self.plan_corners();
         self.explain(AFTER);
         let positions: Vec<f64> = samples().map(|sample| sample.position).collect();
         self.turn.push(pose, seconds(tick.time));
@@ -201,12 +292,15 @@ impl LineErrors {
     /// Evaluates the first waiting tool pose.
     fn evaluate(&mut self) -> Option<CycleError> {
         let (actual, time, delayed) = self.poses.pop_front()?;
-        let (mut error, mut nearest, mut axis, mut reference) = (f64::INFINITY, 0, actual.axis, actual.tip);
+        let (mut drives, mut nearest, mut axis, mut reference) = (f64::INFINITY, 0, actual.axis, actual.tip);
+        let mut path_position = 0.0;
         for (i, pair) in self.window.iter().zip(self.window.iter().skip(1)).enumerate() {
             let [from, to] = [&pair.0.pose, &pair.1.pose];
             let (distance, along) = distance(&actual.tip, &from.tip, &to.tip);
-            if distance < error {
-                (error, nearest, axis) = (distance, i + 1, from.axis + (to.axis - from.axis) * along);
+            if distance < drives {
+                let [start, end] = [pair.0.place.path_position, pair.1.place.path_position];
+                path_position = start + (end - start) * along;
+                (drives, nearest, axis) = (distance, i + 1, from.axis + (to.axis - from.axis) * along);
                 reference = from.tip + (to.tip - from.tip) * along;
             }
         }
@@ -214,7 +308,11 @@ impl LineErrors {
             axis = delayed.axis;
         }
         let last_tip = self.last_tip.replace(actual.tip);
-        error.is_finite().then(|| {
+        drives.is_finite().then(|| {
+            let nearest_to = |tip| self.programmed.nearest(tip, path_position);
+            let blending = nearest_to(&reference).map_or(0.0, |point| (reference - point).norm());
+            reference = nearest_to(&actual.tip).unwrap_or(reference);
+            let contour_error = (actual.tip - reference).norm();
             let TrackedSetpoint { place, tip_feed, .. } = &self.window[nearest];
             let found = CycleError {
                 time: seconds(time),
@@ -224,19 +322,67 @@ impl LineErrors {
                 path_position: place.path_position,
                 programmed_feed: *tip_feed,
                 reached_feed: last_tip.map_or(0.0, |last| (actual.tip - last).norm() / self.period),
-                contour_error: error,
+                contour_error,
+                blending,
+                drives,
+                is_rapid: place.programmed_feed.is_infinite(),
             };
             let orientation = Kinematics::orientation_error(&axis, &actual.axis);
             let before = if self.last_line.0 == place.line { self.last_line.1 } else { 0.0 };
             self.last_line = (place.line, orientation.max(before));
-            self.record(error, nearest, time);
+            self.record(&found, self.passed + nearest);
+            self.pass_corners([last_tip.unwrap_or(actual.tip), actual.tip], path_position, &found, nearest);
             found
         })
     }
 
-    fn record(&mut self, error: f64, index: usize, time: Nanoseconds) {
-        let PathPlace { line, programmed_feed, .. } = self.window[index].place;
-        let lines = &mut self.worst[usize::from(programmed_feed.is_infinite())];
+    /// Adds the newest setpoint to the corners near it.
+    fn plan_corners(&mut self) {
+        let Some(newest) = self.window.back() else { return };
+        let before = self.window.iter().rev().nth(1).unwrap_or(newest);
+        while let Some(corner) = self.programmed.next_corner(newest.place.path_position + CORNER_AHEAD) {
+            self.corners.push_back(PassedCorner { corner, planned: f64::INFINITY, nearest: None });
+        }
+        for passed in &mut self.corners {
+            let planned = distance(&passed.corner.tip, &before.pose.tip, &newest.pose.tip).0;
+            passed.planned = passed.planned.min(planned);
+        }
+    }
+
+    /// Follows the corners of the programmed path near `path_position`: of a corner that is cut, the distance from the
+    /// planned path and from the tool path is the error.
+    fn pass_corners(
+        &mut self,
+        [before, tip]: [Vector3<f64>; 2],
+        path_position: f64,
+        cycle: &CycleError,
+        nearest: usize,
+    ) {
+        for passed in &mut self.corners {
+            let actual = distance(&passed.corner.tip, &before, &tip).0;
+            if passed.nearest.is_none_or(|(least, ..)| actual < least) {
+                passed.nearest = Some((actual, *cycle, self.passed + nearest));
+            }
+        }
+        while self.corners.front().is_some_and(|corner| corner.is_passed(path_position)) {
+            self.corners.pop_front().into_iter().for_each(|corner| self.record_corner(corner));
+        }
+    }
+
+    fn record_corner(&mut self, passed: PassedCorner) {
+        if let Some((actual, mut cycle, number)) = passed.nearest
+            && actual > cycle.contour_error
+        {
+            (cycle.contour_error, cycle.blending) = (actual, passed.planned);
+            self.record(&cycle, number);
+        }
+    }
+
+    fn record(&mut self, cycle: &CycleError, number: usize) {
+        let CycleError { line, time, .. } = *cycle;
+        let kind = usize::from(cycle.is_rapid);
+        self.sums[kind].add(cycle);
+        let (lines, error) = (&mut self.worst[kind], cycle.contour_error);
         let known = lines.iter().position(|(worst, _)| worst.line == line);
         let mut orientation = self.last_line.1;
         if let Some((worst, _)) = known.and_then(|known| lines.get_mut(known)) {
@@ -251,10 +397,11 @@ impl LineErrors {
         if let Some(index) = known {
             lines.remove(index);
         }
-        let (text, time, cause) = (String::new(), seconds(time), Cause::Feed);
-        let entry = WorstLine { line, text, error, orientation, time, cause };
+        let (text, cause) = (String::new(), Cause::Feed);
+        let CycleError { blending, drives, .. } = *cycle;
+        let entry = WorstLine { line, text, error, blending, drives, orientation, time, cause };
         let place = lines.partition_point(|(worst, _)| worst.error >= error);
-        lines.insert(place, (entry, Some(self.passed + index)));
+        lines.insert(place, (entry, Some(number)));
         lines.truncate(COUNT);
     }
 
@@ -320,6 +467,9 @@ impl LineErrors {
         while !self.poses.is_empty() {
             self.evaluate().iter().for_each(&mut visit);
         }
+        for passed in std::mem::take(&mut self.corners) {
+            self.record_corner(passed);
+        }
         self.explain(0);
         let numbers = self.worst.iter().flatten().map(|(worst, _)| worst.line).collect();
         let texts = line_texts(name, builtin, &numbers)?;
@@ -328,7 +478,8 @@ impl LineErrors {
             lines.into_iter().map(|(worst, _)| WorstLine { text: text(worst.line), ..worst }).collect()
         });
         let ProgramTrack { cycle_time, programmed_time, .. } = *track;
-        Ok(ProgramFigures { cycle_time, programmed_time, worst_lines, worst_rapids })
+        let [cuts, rapids] = self.sums.map(|sums| sums.figures());
+        Ok(ProgramFigures { cycle_time, programmed_time, cuts, rapids, worst_lines, worst_rapids })
     }
 }
 

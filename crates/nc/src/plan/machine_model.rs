@@ -70,10 +70,15 @@ impl MachineModel {
     /// Returns the joints with their derivatives at `u` from the start of `piece`.
     pub fn joints(&self, piece: &Piece, u: f64) -> Jet {
         let mut jet = piece.jet(u);
-        if let (Some(length), Some(tip)) = (piece.tcp_length, &self.tip) {
-            tip.apply(&mut jet, length);
-        }
+        self.apply_tip(&mut jet, piece.tcp_length);
         jet
+    }
+
+    /// Converts the tip of tool center point control with a tool length into joints.
+    pub fn apply_tip(&self, coordinates: &mut Jet, tcp_length: Option<f64>) {
+        if let (Some(length), Some(tip)) = (tcp_length, &self.tip) {
+            tip.apply(coordinates, length);
+        }
     }
 
     /// Returns the joint derivatives and the largest rate of the path parameter at `u`.
@@ -84,9 +89,7 @@ impl MachineModel {
             let bend = norm(&jet[2], &self.kinds.linear);
             cap = cap.min((self.centripetal / bend).sqrt());
         }
-        if let (Some(length), Some(tip)) = (piece.tcp_length, &self.tip) {
-            tip.apply(&mut jet, length);
-        }
+        self.apply_tip(&mut jet, piece.tcp_length);
         for (bounds, first) in self.joints.iter().zip(&jet[1]) {
             cap = cap.min(bounds.velocity / first.abs());
         }

@@ -32,6 +32,8 @@ pub(super) struct PieceSource<'a> {
     largest: f64,
     /// Lines and feeds of the motions read.
     pub marks: VecDeque<Mark>,
+    /// Curves read with their path parameters at the start, if they are kept.
+    pub programmed: Option<Vec<(f64, MotionCurve)>>,
     /// Duration of the motions read at their programmed feed, s.
     pub programmed_time: f64,
 }
@@ -45,6 +47,7 @@ impl<'a> PieceSource<'a> {
             end: 0.0,
             largest,
             marks: VecDeque::new(),
+            programmed: None,
             programmed_time: 0.0,
         }
     }
@@ -103,6 +106,9 @@ impl<'a> PieceSource<'a> {
     }
 
     fn mark(&mut self, curve: &MotionCurve) {
+        if let Some(programmed) = &mut self.programmed {
+            programmed.push((self.end, curve.clone()));
+        }
         self.end += curve.length;
         self.programmed_time += curve.programmed_time();
         self.marks.push_back(Mark { end: self.end, line: curve.line, feed: curve.feed });

@@ -320,9 +320,10 @@ fn alarms_and_missing_lines_are_rejected() {
         ("O1\nEND1\n", "part.nc:2: END1 without DO1"),
         ("O1\nG65 A1.\n", "part.nc:2: G65 requires P, the number of the macro"),
         ("O1\nG150 P5 X1.\n", "part.nc:2: G150 is not supported in the dialect haas: pocket milling"),
+        ("O1\nG68.2 P2 Q4 X0\n", "part.nc:2: G68.2 P2 Q4 is invalid: Q1 to Q3 are the lines of the plane"),
         (
-            "O1\nG31 Z-5. F10.\n",
-            "part.nc:2: G31 is not supported in the dialect haas: probing needs a workpiece",
+            "O1\nG68.2 P3 Q1 X0 I0 J0 K1.\nG68.2 P3 Q2 K1.\n",
+            "part.nc:3: G68.2: points on a line, or vectors of the same direction, give no plane",
         ),
         ("O1\nIF[#1EQ1]X5.\n", "part.nc:2: X5.: IF requires GOTO or THEN"),
     ] {
@@ -396,4 +397,62 @@ fn references_interrupt_tool_center_point_control() {
     let lengths: Vec<_> = found.iter().map(|motion| motion.tcp_length.is_some()).collect();
     assert_eq!(lengths, [false, true, false, true]);
     assert_eq!(found[2].end[2], 0.0, "Z at its reference");
+}
+
+#[test]
+fn the_forms_of_tilted_planes_agree() {
+    let machine = five_axes();
+    let transform = TipTransform::new(&machine);
+    let (sin, cos) = 30_f64.to_radians().sin_cos();
+    // Turned by 30 degrees about X: (x, y, z) becomes (x, y cos − z sin, y sin + z cos).
+    let about_x = |[x, y, z]: [f64; 3]| [x, y * cos - z * sin, y * sin + z * cos];
+    let about_y = |[x, y, z]: [f64; 3]| [x * cos + z * sin, y, z * cos - x * sin];
+    let about_z = |[x, y, z]: [f64; 3]| [x * cos - y * sin, x * sin + y * cos, z];
+    let point = [8.0, 6.0, 40.0];
+    for (lines, turned) in [
+        ("G68.2 X5. Y-3. Z2. I0 J30. K0", about_x(point)),
+        ("G68.2 P1 X5. Y-3. Z2. I30. J0 K0", about_x(point)),
+        ("G68.2 P1 Q123 X5. Y-3. Z2. I30. J30. K30.", about_z(about_y(about_x(point)))),
+        ("G68.2 P1 Q321 X5. Y-3. Z2. I30. J30. K30.", about_x(about_y(about_z(point)))),
+        (
+            "G68.2 P2 Q1 X5. Y-3. Z2.\nG68.2 P2 Q2 X9. Y-3. Z2.\nG68.2 P2 Q3 X3. Y5.6602540378443865 Z7.",
+            about_x(point),
+        ),
+        (
+            "G68.2 P2 Q0 X1. Y2. Z3. R30.\nG68.2 P2 Q1 X5. Y-3. Z2.\nG68.2 P2 Q2 X9. Y-3. Z2.\nG68.2 P2 Q3 X5. Y0 Z2.",
+            {
+                let turned = about_z(point);
+                [turned[0] + 1.0, turned[1] + 2.0, turned[2] + 3.0]
+            },
+        ),
+        ("G68.2 P3 Q1 X5. Y-3. Z2. I1. J0 K0\nG68.2 P3 Q2 I0 J-0.5 K0.8660254037844386", about_x(point)),
+        ("G68.2 P4 X5. Y-3. Z2. I0 J30. K0", about_x(point)),
+        ("G68.2 P4 X5. Y-3. Z2. I30. J0 K30.", about_y(about_z(point))),
+    ] {
+        let mut options =
+            InterpreterOptions { dialect: Some(Dialect::Fanuc), ..InterpreterOptions::for_machine(&machine) };
+        options.tools.insert(2, Tool { length: 0.04, ..Tool::default() });
+        let text = format!("O1\nG21 G90 G54\n{lines}\nG53.1\nG43 H2 Z40.\nG1 X8. Y6. F500.\nG69\nM30\n");
+        let found = motions(&text, options);
+        let tip = millimeters(&transform.tip_of(&found.last().expect("a motion").end, 0.04));
+        let workpiece = machine.kinematics().workpiece;
+        for (axis, origin) in [5.0, -3.0, 2.0].into_iter().enumerate() {
+            let expected = turned[axis] + origin + 1e3 * workpiece[axis];
+            assert!(
+                (tip[axis] - expected).abs() < 1e-9,
+                "{lines}: {tip:?}, expected {expected} of axis {axis}"
+            );
+        }
+    }
+}
+
+#[test]
+fn probing_moves_to_its_end() {
+    let text = "O1\nG90 G21\nG65 P9832\nG65 P9810 X10. Y5. F2000.\nG65 P9811 Z-3.\nG31 Z-5. F100.\n#1=#5063\nG1 Z#1 X11.\n\
+                G65 P9833\nM30\n";
+    assert_ends(Dialect::Haas, text, &[[10.0, 5.0, 0.0], [10.0, 5.0, -5.0], [11.0, 5.0, -5.0]]);
+    // A macro of the program itself runs.
+    assert_ends(Dialect::Fanuc, "O1\nG65 P9810 X3.\nM30\nO9810\nG0 Y#24\nM99\n", &[[0.0, 3.0, 0.0]]);
+    let text = "G38.2 Z-2 F50\nG0 X#5063\nG38.5 Z0\n";
+    assert_ends(Dialect::LinuxCnc, text, &[[0.0, 0.0, -2.0], [-2.0, 0.0, -2.0], [-2.0, 0.0, 0.0]]);
 }

@@ -78,7 +78,7 @@ fn all_errors_of_a_program_are_reported_once_with_count_and_line() {
         (
             2,
             2,
-            "G15 is not supported in the dialect linuxcnc: known in --dialect fanuc or haas or mach3; or skip it with --ignore G15",
+            "G15 is not supported in the dialect linuxcnc: known in --dialect fanuc or haas or mach3 or okuma; or skip it with --ignore G15",
         ),
         (
             3,

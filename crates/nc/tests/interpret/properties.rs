@@ -54,7 +54,7 @@ fn check(text: &[u8]) -> usize {
                 let message = error.to_string();
                 assert!(message.starts_with(&format!("p.nc:{}: ", error.line)), "{message}");
                 assert!(!message.chars().any(|c| c.is_control()), "{message:?}");
-                assert!(error.line <= text.split(|byte| *byte == b'\n').count(), "{message}");
+                assert!(error.line <= text.split(|byte| matches!(byte, b'\n' | b'\r')).count(), "{message}");
                 line = error.line;
             }
         }

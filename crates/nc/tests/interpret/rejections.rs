@@ -17,7 +17,6 @@ fn invalid_words_are_rejected_with_their_line() {
             "G16",
             "part.nc:1: G16 is not supported in the dialect linuxcnc: known in --dialect fanuc or haas or mach3",
         ),
-        ("G38.2 Z-1", "part.nc:1: G38.2 is not supported in the dialect linuxcnc: probing needs a workpiece"),
         ("M200", "part.nc:1: M200 is not supported in the dialect linuxcnc: skip it with --ignore M200"),
         ("M97", "part.nc:1: M97 is not supported in the dialect linuxcnc: known in --dialect haas"),
         ("G33 Z1", "part.nc:1: G33 and G33.1 require K above 0, the pitch per revolution"),

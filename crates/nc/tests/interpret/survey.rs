@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use virtual_axes_core::config::{MachineConfig, Parameters};
+use virtual_axes_core::config::{DEFINITIONS, MachineConfig, ParameterKind, Parameters};
 use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions, WorkOffset};
 use virtual_axes_nc::offline::{PartProgramOptions, ProgramSurvey};
 
@@ -119,4 +119,13 @@ fn subprograms_stand_in_files_beside_the_program() {
         error,
         "part.nc:1: Onone: no such subprogram in this file, and no file with its name beside it"
     );
+}
+
+#[test]
+fn a_machine_file_may_choose_every_dialect() {
+    let definition = DEFINITIONS.iter().find(|definition| definition.key == "part_program.dialect");
+    let Some(ParameterKind::Choice(names)) = definition.map(|definition| definition.kind) else {
+        panic!("{definition:?}");
+    };
+    assert_eq!(names, Dialect::ALL.map(Dialect::name));
 }

@@ -14,8 +14,9 @@ The ROS messages of the node are in the module `virtual_axes`, which ROS generat
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 from . import design
 from ._native import PartProgram, Rst, Scenario, __version__, machine_names, nc_program_names, scenario_names
@@ -83,6 +84,11 @@ def nc_program(
     ignore: Iterable[int | str] = (),
     chord_error: float | None = None,
     centripetal_acceleration: float | None = None,
+    dialect: str | None = None,
+    work_offset: Mapping[str, Sequence[float]] | str | Iterable[str] = (),
+    tools: str | os.PathLike[str] | Mapping[int, tuple[float, float]] | None = None,
+    tool_change_s: float | None = None,
+    spindle_s: float | None = None,
 ) -> PartProgram:
     """Names a part program in G code: a built-in one (`nc_program_names()`) or a file.
 
@@ -92,12 +98,43 @@ def nc_program(
 
     `feed_override` is above 0 and at most 2, 1 for the programmed feed. `ignore` contains M codes without effect, as
     `[7, "M110"]`. `chord_error` bounds the chord error of the setpoints as a polyline, m, and
-    `centripetal_acceleration` that of the tool tip, m/s². Raises `ValueError` for other values.
+    `centripetal_acceleration` that of the tool tip, m/s².
+
+    What is not given is that of the machine file (`part_program`). `dialect` is linuxcnc, fanuc, haas, sinumerik, grbl,
+    mach3 or okuma. `work_offset` has X, Y and Z in m, then A, B and C in rad, as in `{"G54": (0.12, 0.08, -0.35)}`, or
+    texts in mm and degrees, as the command: `"G54=120,80,-350"`. `tools` is the path of a tool table (tool.tbl of
+    LinuxCNC, or CSV, both in mm), or length and radius in m by number, as in `{1: (0.05, 0.005)}`. `tool_change_s` is
+    the duration of a tool change, and `spindle_s` that of a change of the spindle speed, s.
+
+    Raises `ValueError` for other values.
     """
+    inline = isinstance(tools, Mapping)
     arguments = {
         "feed_override": feed_override,
         "ignore": [str(code) for code in ([ignore] if isinstance(ignore, str) else ignore)],
         "chord_error": chord_error,
         "centripetal_acceleration": centripetal_acceleration,
+        "dialect": dialect,
+        "work_offset": _work_offsets(work_offset),
+        "tool_table": None if inline or tools is None else to_path("tools", tools),
+        "tools": [_tool(number, *size) for number, size in tools.items()] if inline else [],
+        "tool_change_s": tool_change_s,
+        "spindle_s": spindle_s,
     }
     return PartProgram.load(to_path("name_or_path", name_or_path), arguments)
+
+
+def _work_offsets(offsets: Mapping[str, Sequence[float]] | str | Iterable[str]) -> list[str]:
+    """Returns work offsets in the notation of the command, mm and degrees."""
+    if not isinstance(offsets, Mapping):
+        return [offsets] if isinstance(offsets, str) else list(offsets)
+    units = [1e3] * 3 + [math.degrees(1.0)] * 3
+    return [
+        f"{name}={','.join(repr(float(value) * unit) for value, unit in zip(values, units, strict=False))}"
+        for name, values in offsets.items()
+    ]
+
+
+def _tool(number: int, length: float, radius: float) -> str:
+    """Returns a tool in the notation of LinuxCNC, mm."""
+    return f"T{number} Z{float(length) * 1e3!r} D{float(radius) * 2e3!r}"

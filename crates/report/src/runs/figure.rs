@@ -3,6 +3,9 @@
 use virtual_axes_core::config::AxisUnits;
 use virtual_axes_core::trial::{AxisFigures, CircleFigures, Figures, Reference};
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MICROMETER, MILLIDEGREE, MILLIMETER};
+use virtual_axes_nc::offline::{ProgramFigures, ProgrammedErrors};
+
+use super::SimulatedRun;
 
 /// One figure of a run.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -122,6 +125,34 @@ fn of_axis(axis: &AxisFigures) -> Vec<Figure> {
         new("time at a limit", r.saturation_time, "s").with_decimals(3),
         new("control activity", r.control_activity, "A").with_decimals(3),
     ]
+}
+
+/// Returns the errors of a run along its path: of a part program first those against the programmed path. `ends` adds the
+/// contour errors without the overshoot at the ends of the path.
+pub fn of_run(run: &SimulatedRun, ends: bool) -> Vec<Figure> {
+    let program = run.part_program.as_ref();
+    let mut found = program.map(|program| of_program(&program.figures)).unwrap_or_default();
+    found.extend(of_path(&run.outcome.figures, ends));
+    found
+}
+
+/// Returns the contour errors of a part program against its programmed path.
+fn of_program(figures: &ProgramFigures) -> Vec<Figure> {
+    let of = |errors: Option<ProgrammedErrors>, motion: &'static str| {
+        let rows = |errors: ProgrammedErrors| {
+            [
+                ("contour error from the programmed path, max", errors.max),
+                ("contour error from the programmed path, RMS", errors.rms),
+                ("share of blending, max", errors.blending),
+                ("share of the drives, max", errors.drives),
+            ]
+        };
+        let figure = move |(name, value): (&str, f64)| {
+            Figure::new("", &format!("{name}{motion}"), value / MICROMETER, "µm")
+        };
+        errors.into_iter().flat_map(rows).map(figure)
+    };
+    of(figures.cuts, "").chain(of(figures.rapids, ", at rapid traverse")).collect()
 }
 
 /// Returns contour error, orientation error and corners. `ends` adds the contour errors

@@ -1,6 +1,6 @@
 //! Times, worst lines and path of a part program.
 
-use virtual_axes_core::units::MILLIDEGREE;
+use virtual_axes_core::units::{MICROMETER, MILLIDEGREE};
 use virtual_axes_nc::offline::{ProgramFigures, WorstLine};
 
 use crate::{Table, TableColumn, ToolPath};
@@ -50,7 +50,9 @@ impl ProgramReport {
                 escape(&worst.text),
                 motion.to_owned(),
                 worst.cause.text(),
-                format!("{:.2}", worst.error * 1e6),
+                format!("{:.2}", worst.error / MICROMETER),
+                format!("{:.2}", worst.blending / MICROMETER),
+                format!("{:.2}", worst.drives / MICROMETER),
                 format!("{:.3}", worst.time),
             ]
         };
@@ -60,14 +62,16 @@ impl ProgramReport {
             ("motion", ""),
             ("cause", ""),
             ("contour error", "µm"),
+            ("blending", "µm"),
+            ("drives", "µm"),
             ("time", "s"),
         ];
         let mut table = Table::new("", &columns);
         table.rows.extend(self.lines().map(row));
         if self.lines().any(|(worst, _)| worst.orientation > 0.0) {
-            table.columns.insert(5, TableColumn::new("orientation error", "mdeg"));
+            table.columns.insert(7, TableColumn::new("orientation error", "mdeg"));
             for (row, (worst, _)) in table.rows.iter_mut().zip(self.lines()) {
-                row.insert(5, format!("{:.2}", worst.orientation / MILLIDEGREE));
+                row.insert(7, format!("{:.2}", worst.orientation / MILLIDEGREE));
             }
         }
         table

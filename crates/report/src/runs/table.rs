@@ -4,7 +4,7 @@ use virtual_axes_core::config::AxisUnits;
 use virtual_axes_core::trial::{AxisFigures, Figures};
 use virtual_axes_core::units::Rounded;
 
-use super::figure;
+use super::{SimulatedRun, figure};
 use crate::Table;
 
 /// Reason for a missing contour error.
@@ -91,10 +91,11 @@ pub fn more(figures: &Figures) -> impl Iterator<Item = String> {
 }
 
 /// Creates the table of contour error, orientation error, circles and corners.
-pub fn path(figures: &Figures) -> Table {
+pub fn path(run: &SimulatedRun) -> Table {
+    let figures = &run.outcome.figures;
     let mut table = Table::new("Path", &[("path error", ""), ("value", ""), ("unit", "")]);
     let figures =
-        figure::of_path(figures, figure::overshoots(figures)).into_iter().chain(figure::of_circles(figures));
+        figure::of_run(run, figure::overshoots(figures)).into_iter().chain(figure::of_circles(figures));
     for figure in figures {
         table.rows.push(vec![figure.title(), figure.text(), figure.unit.to_owned()]);
     }

@@ -6,6 +6,9 @@ use virtual_axes_core::units::MICROMETER;
 use super::figure::{self, Figure, percent};
 use super::{SimulatedRun, table};
 
+/// Share of blending that is not mentioned, m.
+const LEAST_BLENDING: f64 = 0.05 * MICROMETER;
+
 /// Returns the verdict of a single run, or a line for each further run that compares it with the first one.
 pub fn lines(runs: &[SimulatedRun]) -> Vec<String> {
     match runs {
@@ -17,29 +20,39 @@ pub fn lines(runs: &[SimulatedRun]) -> Vec<String> {
 
 fn single(run: &SimulatedRun) -> String {
     let figures = &run.outcome.figures;
-    let main = main_figure(figures);
-    let contour = figure::of_path(figures, false);
+    let main = main_figure(run);
+    let contour = figure::of_run(run, false);
     let text = match contour.get(1) {
         _ if figures.axes.iter().all(|axis| !axis.moves) => "no axis moves".to_owned(),
         Some(rms) if main.subject.is_empty() => {
-            let rapids = figures
-                .contour
-                .and_then(|contour| contour.rapids)
-                .map(|rapids| format!(" at feed; at rapid traverse {:.1} µm max", rapids.max / MICROMETER));
-            format!("contour error {} µm max, {} µm RMS", main.text(), rms.text())
-                + &rapids.unwrap_or_default()
+            format!("contour error {} µm max, {} µm RMS", main.text(), rms.text()) + &of_motions(run)
         }
         _ => format!("{} {} {}", without_max(&main), main.text(), main.unit),
     };
     text + &warnings(run)
 }
 
+/// Returns the kind of motion of a contour error, its shares, and the error at rapid traverse.
+fn of_motions(run: &SimulatedRun) -> String {
+    let Some(program) = &run.part_program else { return String::new() };
+    let (cuts, rapids) = (program.figures.cuts, program.figures.rapids);
+    let mut text = if cuts.is_some() { " at feed" } else { " at rapid traverse" }.to_owned();
+    if let Some(errors) = cuts.or(rapids).filter(|errors| errors.blending > LEAST_BLENDING) {
+        let [blending, drives] = [errors.blending, errors.drives].map(|error| error / MICROMETER);
+        text += &format!(" (blending {blending:.1} µm, drives {drives:.1} µm)");
+    }
+    if let (Some(_), Some(rapids)) = (cuts, rapids) {
+        text += &format!("; at rapid traverse {:.1} µm max", rapids.max / MICROMETER);
+    }
+    text
+}
+
 fn compared(first: &SimulatedRun, run: &SimulatedRun) -> String {
-    let from = main_figure(&first.outcome.figures);
+    let from = main_figure(first);
     let figures = &run.outcome.figures;
     let same = |to: &Figure| to.subject == from.subject && to.name == from.name;
-    let to = figure::of_path(figures, false).into_iter().chain(figure::of_axes(figures)).find(same);
-    let to = to.unwrap_or_else(|| main_figure(figures));
+    let to = figure::of_run(run, false).into_iter().chain(figure::of_axes(figures)).find(same);
+    let to = to.unwrap_or_else(|| main_figure(run));
     let change = percent(&from, &to).map(|change| format!(", {change}")).unwrap_or_default();
     let warnings = warnings(run);
     let (title, name) = (run.title(), without_max(&to));
@@ -51,9 +64,10 @@ fn without_max(figure: &Figure) -> String {
 }
 
 /// Returns the largest contour error if several axes move the tool, else the largest delay-compensated following error.
-fn main_figure(figures: &Figures) -> Figure {
+fn main_figure(run: &SimulatedRun) -> Figure {
+    let figures = &run.outcome.figures;
     let moving = figures.moving_tool_axes().count();
-    let contour = figure::of_path(figures, false).into_iter().next();
+    let contour = figure::of_run(run, false).into_iter().next();
     let contour = contour.filter(|_| figures.contour.is_some_and(|contour| contour.max > 0.0));
     match (worst_axis(figures), contour) {
         (Some(worst), None) => worst,

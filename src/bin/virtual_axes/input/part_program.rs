@@ -14,11 +14,9 @@ use virtual_axes_nc::plan::PlanOptions;
 use crate::builtin::PROGRAMS;
 
 /// Extensions of part programs.
-const EXTENSIONS: [&str; 8] = ["nc", "ngc", "tap", "cnc", "mpf", "gcode", "iso", "eia"];
+const EXTENSIONS: [&str; 10] = ["nc", "ngc", "tap", "cnc", "mpf", "spf", "min", "gcode", "iso", "eia"];
 /// Extensions of other inputs.
 const OTHER_EXTENSIONS: [&str; 5] = ["csv", "yaml", "yml", "mcap", "json"];
-/// Longest tool table, bytes.
-const MAX_TABLE: u64 = 1 << 24;
 /// Bytes at the start of a file in which a part program without known extension is recognized.
 const HEAD: u64 = 1 << 14;
 /// Micrometer, m.
@@ -30,20 +28,20 @@ pub struct PartProgramArguments {
     /// Feed override of a part program, 0 to 200 %: constant, or from times on, as in `0:100,2.5:0,4:120`.
     #[arg(long = "override", value_name = "PERCENT|S:PERCENT,…", allow_hyphen_values = true)]
     feed_override: Option<String>,
-    /// Dialect of a part program: linuxcnc, fanuc, haas, sinumerik, grbl or mach3 [default: detected from its content].
+    /// Dialect of a part program: linuxcnc, fanuc, haas, sinumerik, grbl, mach3 or okuma [default: of the machine file, or detected from the content].
     #[arg(long, value_name = "DIALECT")]
     dialect: Option<Dialect>,
-    /// Work offset of a part program, as in G54=120,80,-350: X, Y and Z in mm, then A, B and C in degrees. Repeatable.
+    /// Work offset of a part program in place of that of the machine file, as in G54=120,80,-350: X, Y and Z in mm, then A, B and C in degrees. Repeatable.
     #[arg(long = "work-offset", value_name = "G54=X,Y,Z", allow_hyphen_values = true)]
     work_offset: Vec<WorkOffset>,
-    /// Tool table of a part program: tool.tbl of LinuxCNC in mm, or CSV with number, length_mm and radius_mm.
+    /// Tool table of a part program: tool.tbl of LinuxCNC in mm, or CSV with number, length_mm and radius_mm [default: of the machine file].
     #[arg(long, value_name = "FILE")]
     tools: Option<PathBuf>,
-    /// Duration of a tool change of a part program, s [default: 0].
-    #[arg(long = "tool-change-s", value_name = "S", value_parser = positive, allow_negative_numbers = true)]
+    /// Duration of a tool change of a part program, s [default: of the machine file].
+    #[arg(long = "tool-change-s", value_name = "S", value_parser = not_negative, allow_negative_numbers = true)]
     tool_change_s: Option<f64>,
-    /// Duration of a change of the spindle speed of a part program, s [default: 0].
-    #[arg(long = "spindle-s", value_name = "S", value_parser = positive, allow_negative_numbers = true)]
+    /// Duration of a change of the spindle speed of a part program, s [default: of the machine file].
+    #[arg(long = "spindle-s", value_name = "S", value_parser = not_negative, allow_negative_numbers = true)]
     spindle_s: Option<f64>,
     /// G and M codes that have no effect in a part program: M7,G187,M100-M199,M1xx,G5*. Of a line without other codes only F, S and T remain. Each one found is noted.
     #[arg(long, value_name = "CODES", value_delimiter = ',')]
@@ -92,11 +90,7 @@ impl PartProgramArguments {
             ..default
         };
         let tools = match &self.tools {
-            Some(path) => {
-                let name = path.display();
-                let text = read_bounded(path).map_err(|error| format!("--tools {name}: {error}"))?;
-                ToolTable::parse(&text).map_err(|error| format!("--tools {name}: {error}"))?
-            }
+            Some(path) => ToolTable::from_file(path).map_err(|error| format!("--tools {error}"))?,
             None => ToolTable::default(),
         };
         Ok(PartProgramOptions {
@@ -105,21 +99,17 @@ impl PartProgramArguments {
             ignored: IgnoredCodes::new(self.ignore.clone()),
             work_offsets: self.work_offset.clone(),
             tools,
-            tool_change_time: self.tool_change_s.unwrap_or(0.0),
-            spindle_time: self.spindle_s.unwrap_or(0.0),
+            tool_change_time: self.tool_change_s,
+            spindle_time: self.spindle_s,
             plan,
         })
     }
 }
 
-/// Reads a file of at most [`MAX_TABLE`] bytes.
-fn read_bounded(path: &Path) -> io::Result<String> {
-    let mut text = String::new();
-    let length = File::open(path)?.take(MAX_TABLE + 1).read_to_string(&mut text)? as u64;
-    match length > MAX_TABLE {
-        true => Err(io::Error::other(format!("the table is longer than {MAX_TABLE} bytes"))),
-        false => Ok(text),
-    }
+/// Reads a number of at least 0.
+fn not_negative(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|value| *value >= 0.0 && value.is_finite());
+    number.ok_or_else(|| "must be a number of at least 0".to_owned())
 }
 
 /// Reads a positive number.

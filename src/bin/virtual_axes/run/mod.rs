@@ -229,7 +229,7 @@ fn single(run: &SimulatedRun) -> Vec<String> {
     let verdict = verdict::lines(std::slice::from_ref(run)).concat();
     let remarks = run.remarks().into_iter().filter(|remark| !verdict.contains(remark.as_str()));
     axes.extend(remarks.map(|remark| text_table::wrapped_line(&remark)));
-    let path = table::path(figures);
+    let path = table::path(run);
     let path = (!path.rows.is_empty()).then(|| format!("{}{}\n", text_table::text(&path), table::SAMPLING));
     let program = run.part_program.as_ref().map(part_program_text);
     std::iter::once(axes).chain(path).chain(program).collect()
@@ -280,7 +280,7 @@ fn csv(runs: &[SimulatedRun]) -> String {
     for run in runs {
         let figures = &run.outcome.figures;
         for figure in
-            [figure::of_axes(figures), figure::of_path(figures, true), figure::of_circles(figures)].concat()
+            [figure::of_axes(figures), figure::of_run(run, true), figure::of_circles(figures)].concat()
         {
             let cells = [run.title(), figure.title(), figure.value.to_string(), figure.unit.to_owned()];
             text.push_str(&text_table::csv_row(&cells));

@@ -55,7 +55,7 @@ impl Axis {
             load_current: -load / torque_constant,
             effort: torque_constant * motor.current * p.inverse_ratio,
             controller: p.controller,
-            saturated: record.saturated > 0.0,
+            saturated: record.saturated > 0.0 && !self.mode.is_off(),
             friction_extrapolated: plant.is_friction_extrapolated(motor.speed),
             ..self.sample
         }

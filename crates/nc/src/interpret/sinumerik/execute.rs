@@ -180,19 +180,24 @@ impl Sinumerik {
             state.modal.selected_tool = number;
             state.push_event(ProgramEvent::ToolSelection(number));
         }
-        let changes = words.m.contains(&6);
+        let changes = words.m.contains(&6) | std::mem::take(&mut self.changes_tool);
         words.m.retain(|code| *code != 6);
         let mut has_edge = false;
         if changes {
-            state.modal.tool = state.modal.selected_tool;
-            // The control selects the first cutting edge with the tool.
-            (self.modes.edge, has_edge) = (1, true);
-            state.push_event(ProgramEvent::ToolChange(state.modal.tool));
+            self.change_tool(state);
+            has_edge = true;
         }
         if let Some(edge) = words.integer("D")? {
             (self.modes.edge, has_edge) = (edge, true);
         }
         if has_edge { self.modes.update_tool_length(state) } else { Ok(()) }
+    }
+
+    /// Changes to the selected tool, with its first cutting edge.
+    fn change_tool(&mut self, state: &mut State) {
+        state.modal.tool = state.modal.selected_tool;
+        self.modes.edge = 1;
+        state.push_event(ProgramEvent::ToolChange(state.modal.tool));
     }
 
     /// Returns the number of a tool by its name; a name that the table lacks gets a number of its own.
@@ -349,10 +354,12 @@ impl Sinumerik {
             Some(number) => {
                 let name = format!("L{number}");
                 if !self.has_subprogram(&name, state, lines)? {
-                    let remedy = format!(
-                        "no such subprogram: add %_N_{name}_SPF to this file, or {name}.SPF beside it"
-                    );
-                    return reject(&name, &remedy, state);
+                    self.accept_absent(&name, state)?;
+                    if !std::mem::take(&mut self.changes_tool) {
+                        return Ok(());
+                    }
+                    self.change_tool(state);
+                    return self.modes.update_tool_length(state);
                 }
                 let invocation = Invocation { name, arguments: Vec::new() };
                 self.call(invocation, times, state, lines)

@@ -54,14 +54,33 @@ impl Sinumerik {
             if scanner.skip("(") {
                 scanner.skip_parentheses()?;
             }
-            let remedy = format!(
-                "neither a word of the control nor a subprogram: add %_N_{name}_SPF to this file, or {name}.SPF beside it"
-            );
-            reject(name, &remedy, state)?;
+            self.accept_absent(name, state)?;
             return Ok(Invocation { name: String::new(), arguments: Vec::new() });
         }
         let arguments = self.call_arguments(scanner, state).map_err(|reason| format!("{name}: {reason}"))?;
         Ok(Invocation { name: name.to_owned(), arguments })
+    }
+
+    /// Takes the call of a subprogram that the program lacks as a tool change, by its name, or as ignored.
+    ///
+    /// # Errors
+    ///
+    /// Any other subprogram.
+    pub(super) fn accept_absent(&mut self, name: &str, state: &mut State) -> Outcome<()> {
+        if is_tool_change(name) {
+            state.assume(format!("{name}: the tool change of the machine builder, as M6"));
+            self.changes_tool = true;
+            return Ok(());
+        }
+        if state.options.ignored.has_name(name) {
+            state.note_without_effect(name.to_owned());
+            return Ok(());
+        }
+        let remedy = format!(
+            "neither a word of the control nor a subprogram: add %_N_{name}_SPF to this file, or {name}.SPF beside it, \
+             or skip it with --ignore {name}"
+        );
+        reject(name, &remedy, state)
     }
 
     /// Executes a call, or stores it for the next motions (MCALL).
@@ -159,6 +178,26 @@ impl Sinumerik {
         self.modes.update_path_control(state);
         Ok(())
     }
+}
+
+/// Returns true for names that machine builders give to the subprogram of the tool change.
+fn is_tool_change(name: &str) -> bool {
+    matches!(
+        name,
+        "L6" | "L06"
+            | "L6_TC"
+            | "L06_TC"
+            | "TC"
+            | "TCHANGE"
+            | "TOOL"
+            | "TOOLCHANGE"
+            | "TOOL_CHANGE"
+            | "TOOLCHG"
+            | "WERKZEUG"
+            | "WERKZEUGWECHSEL"
+            | "WZW"
+            | "WZWECHSEL"
+    )
 }
 
 /// Returns true for a cycle that is executed.

@@ -57,6 +57,8 @@ use crate::motion::Plane;
 #[derive(Debug)]
 pub(super) struct Sinumerik {
     block: BlockText,
+    /// True if the block calls the tool change of a machine builder.
+    changes_tool: bool,
     variables: Variables,
     macros: Macros,
     modes: Modes,
@@ -92,6 +94,7 @@ impl Default for Sinumerik {
     fn default() -> Self {
         Self {
             block: BlockText::default(),
+            changes_tool: false,
             variables: Variables::new(),
             macros: Macros::default(),
             modes: Modes::default(),

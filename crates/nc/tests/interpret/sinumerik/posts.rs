@@ -1,10 +1,10 @@
 //! Programs in the manner of post-processors and shops: they run as they are, with the motions counted by hand.
 
 use virtual_axes_core::config::Parameters;
-use virtual_axes_nc::interpret::{Dialect, InterpreterOptions, Tool};
-use virtual_axes_nc::motion::{Feed, ProgramMotion, ProgramStep};
+use virtual_axes_nc::interpret::{Dialect, IgnoredCodes, InterpreterOptions, Tool};
+use virtual_axes_nc::motion::{Feed, ProgramEvent, ProgramMotion, ProgramStep};
 
-use crate::common::{motions, steps};
+use crate::common::{events, motions, steps};
 
 /// Program with its motions at feed, and axis positions at the end, mm and degrees, where they are closed forms.
 struct Post {
@@ -238,4 +238,28 @@ posts! {
     family: FAMILY;
     chamfered_plate: CHAMFERED_PLATE;
     synchronized: SYNCHRONIZED;
+}
+
+#[test]
+fn tool_changes_of_machine_builders_and_shopmill_groups_are_accepted() {
+    let text = "GROUP_BEGIN(0,\"HEAD\",0,0)\nWORKPIECE(,\"\",,\"BOX\",0,2,-30,-80,-2,-2,184,170)\nG54 G71 G90 G94\n\
+                GROUP_END(0,0)\nT=\"MILL_10\"\nL6\nT2\nTC\nL6_TC(1,2)\nG0 X28 Y-55\nG1 Y221 F500\nM30\n";
+    let options = InterpreterOptions { dialect: Some(Dialect::Sinumerik), ..InterpreterOptions::default() };
+    let changes = events(text, options.clone());
+    let changes = changes.iter().filter(|(_, event)| matches!(event, ProgramEvent::ToolChange(_))).count();
+    assert_eq!(changes, 3);
+    let last = motions(text, options).last().map(|motion| motion.end).expect("a motion");
+    assert!((last[1] - 0.221).abs() < 1e-12);
+}
+
+#[test]
+fn absent_subprograms_are_skipped_on_request() {
+    let text = "N10 G0 X5\nL9010\nN20 TOOLCHECK(1,2)\nN30 X7\nM30\n";
+    let mut options =
+        InterpreterOptions { dialect: Some(Dialect::Sinumerik), ..InterpreterOptions::default() };
+    let error = steps(text, options.clone()).expect_err("an absent subprogram").to_string();
+    assert!(error.ends_with("or skip it with --ignore L9010"), "{error}");
+    let patterns = ["L9010", "TOOLCHECK"].map(|name| name.parse().expect("a name"));
+    options.ignored = IgnoredCodes::new(patterns.to_vec());
+    assert_eq!(motions(text, options).len(), 2);
 }
