@@ -209,11 +209,7 @@ def test_the_setup_of_a_part_program_shifts_the_part_and_adds_its_times(tmp_path
 @pytest.mark.parametrize(
     ("call", "error", "text"),
     [
-        (
-            lambda m: va.nc_program("a.nc", dialect="heidenhain"),
-            ValueError,
-            "heidenhain: not a dialect; must be one of",
-        ),
+        (lambda m: va.nc_program("a.nc", dialect="plotter"), ValueError, "plotter: not a dialect; must be one of"),
         (lambda m: va.nc_program("a.nc", work_offset="G54=1"), ValueError, "work_offset G54=1: must be a work"),
         (lambda m: va.nc_program("a.nc", tools={1: (1e9, 0)}), ValueError, "tools: line 1: Z1"),
         (lambda m: va.nc_program("a.nc", tools="/nowhere.tbl"), ValueError, "tools: /nowhere.tbl"),

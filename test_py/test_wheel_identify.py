@@ -147,6 +147,51 @@ def test_a_tuning_has_the_values_of_the_command(controller: str, machine: va.Mac
     assert again.figures["contour_error_um"]["max"] == pytest.approx(found.cost, rel=1e-12)
 
 
+def test_a_robustness_has_the_values_of_the_command(machine: va.Machine) -> None:
+    expected = json.loads(command("robustness", "corner-90", "--by", "0.2", "--json"))
+    found = va.robustness(machine, va.scenario("corner-90"), by=0.2)
+    assert found.summary == expected
+    nominal = machine.simulate(va.scenario("corner-90"))
+    assert found.nominal_cost == pytest.approx(nominal.figures["contour_error_um"]["max"], rel=1e-12)
+    assert found.worst_cost > found.nominal_cost
+    with pytest.raises(ValueError, match=r"by 0.9: must be in 0 … 0.8"):
+        va.robustness(machine, va.scenario("corner-90"), by=0.9)
+
+
+def test_learned_setpoints_have_the_values_of_the_command(machine: va.Machine) -> None:
+    expected = json.loads(command("learn", "corner-90", "--iterations", "3", "--json"))
+    found = va.learn(machine, va.scenario("corner-90"), iterations=3)
+    assert found.summary == expected
+    assert found.best == expected["best"] > 0
+    # The compensated setpoints are repeatable: a run of them has the following errors of the iteration.
+    again = machine.simulate(found.psec, figures="axes").figures["axes"]
+    assert again["x"] == expected["iterations"][found.best]["figures"]["axes"]["x"]
+    with pytest.raises(ValueError, match="gain 3: must be above 0 and at most 2"):
+        va.learn(machine, va.scenario("corner-90"), gain=3)
+
+
+def test_only_stated_values_make_a_recording_implausible(machine: va.Machine, tmp_path: Path) -> None:
+    slow = machine.with_({"x.feedforward.velocity": 0.0, "x.feedforward.torque_kg_m2": 0.0})
+    run = slow.simulate(va.scenario("x-there-and-back"))
+    channels = {"time": run.time, **{name: run.axis("x")[name] for name in ("psec", "position")}}
+    limit = machine.parameters["x.motor.max_current_a"]
+    # Up to 8 times the current limit of the built-in motor, more than the 5 times that are plausible.
+    steady = np.quantile(np.abs(run.current[:, 0]), 0.99)
+    channels["current"] = run.current[:, 0] * 8 * limit / steady
+    assert 8 * limit < 1000
+    (tmp_path / "machine.yaml").write_text(slow.to_yaml())
+
+    def doubts(given: va.Machine) -> bool:
+        try:
+            findings = va.identify(channels, "x", given, feedforward="off", refine=()).findings
+        except ValueError as error:
+            findings = [str(error)]
+        return any("the current reaches" in line for line in findings)
+
+    stated = [va.Machine.load(tmp_path / "machine.yaml"), slow.with_({"x.motor.max_current_a": limit})]
+    assert [doubts(one) for one in (slow, *stated)] == [False, True, True]
+
+
 @pytest.mark.parametrize(
     ("options", "text"),
     [

@@ -11,6 +11,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyList};
 use virtual_axes_core::config::{Assignment, Value, ValueSource};
 
+use crate::machine::WITH;
+
 /// Returns a `ValueError` with the text of an error.
 pub fn value_error(error: impl Into<Box<dyn Error + Send + Sync>>) -> PyErr {
     PyValueError::new_err(error.into().to_string())
@@ -65,7 +67,7 @@ pub fn check_stopped(stopped: &AtomicBool) -> std::io::Result<()> {
 
 /// Converts a dictionary of parameters to assignments.
 pub fn assignments(changes: &Bound<'_, PyDict>) -> PyResult<Vec<Assignment>> {
-    let source = ValueSource::named("with_");
+    let source = ValueSource::named(WITH);
     let assignment = |(key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         let key: String =
             key.extract().map_err(|_| PyTypeError::new_err("the key of a parameter is a str"))?;

@@ -159,7 +159,7 @@ impl IdentifyOptions {
         })
     }
 
-    fn conditioning(&self) -> PyResult<Conditioning> {
+    fn conditioning(&self, stated: StatedValues) -> PyResult<Conditioning> {
         /// Largest shift, ms.
         const LARGEST: f64 = 1000.0;
         let psec_shift = match &self.psec_shift {
@@ -181,7 +181,7 @@ impl IdentifyOptions {
                 .map(|milliseconds| milliseconds * MILLISECOND),
             psec_shift,
             trace_filter: self.trace_filter_hz,
-            stated: StatedValues::ALL,
+            stated,
         })
     }
 }
@@ -239,6 +239,7 @@ pub fn identify(
 ) -> PyResult<PyIdentification> {
     let machine: &PyMachine = &machine;
     let index = machine.axis_index(axis)?;
+    let stated = machine.stated(axis);
     let sources = |given: &[GivenRecording<'_>]| -> PyResult<Vec<Source>> {
         given.iter().enumerate().map(|(index, one)| one.source(index + 1)).collect()
     };
@@ -252,11 +253,10 @@ pub fn identify(
         (given, _) => given,
     };
     let of_others = modes(for_others, others.len(), "validate_feedforward")?;
-    let reading = (&options.reading()?, &options.conditioning()?);
+    let reading = (&options.reading()?, &options.conditioning(stated)?);
     let i0 = if options.free_i0 { Breakaway::Freed } else { Breakaway::Held };
     let refine = scope(options.refine.as_ref())?;
-    let chosen =
-        IdentificationOptions { i0, refine, presliding: options.presliding, stated: StatedValues::ALL };
+    let chosen = IdentificationOptions { i0, refine, presliding: options.presliding, stated };
     let periods = machine.config.periods();
     let axis = (&machine.config.axes()[index], &periods);
     let stopped = AtomicBool::new(false);

@@ -38,7 +38,7 @@ mod _native {
     #[pymodule_export]
     use super::stepper::{Stepper, StepperState};
     #[pymodule_export]
-    use super::tuning::tune;
+    use super::tuning::{learn, robustness, tune};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use virtual_axes_core::config::{MachineConfig, Parameters};
+use virtual_axes_core::config::{MachineConfig, Parameters, ValueSource};
 use virtual_axes_core::machine::MachineParameters;
+use virtual_axes_identify::recording::StatedValues;
 
 use crate::convert::{assignments, value_error};
 
@@ -15,7 +16,12 @@ pub struct PyMachine {
     pub parameters: Parameters,
     pub config: MachineConfig,
     pub discretized: Arc<MachineParameters>,
+    /// True for a built-in machine, of which the user has stated the values of `with_` only.
+    pub is_builtin: bool,
 }
+
+/// Source of the values of `with_` in errors.
+pub const WITH: &str = "with_";
 
 /// Returns the names of the built-in machines, the default first.
 #[pyfunction]
@@ -27,7 +33,7 @@ impl PyMachine {
     pub fn new(parameters: Parameters) -> PyResult<Self> {
         let config = parameters.machine_config().map_err(value_error)?;
         let discretized = MachineParameters::new(&config).map(Arc::new).map_err(value_error)?;
-        Ok(PyMachine { parameters, config, discretized })
+        Ok(PyMachine { parameters, config, discretized, is_builtin: false })
     }
 
     /// Returns the index of an axis by its name.
@@ -43,6 +49,12 @@ impl PyMachine {
     pub fn changed(&self, changes: &Bound<'_, PyDict>) -> PyResult<Self> {
         let mut parameters = self.parameters.clone();
         parameters.set_all(assignments(changes)?).map_err(value_error)?;
-        PyMachine::new(parameters)
+        Ok(PyMachine { is_builtin: self.is_builtin, ..PyMachine::new(parameters)? })
+    }
+
+    /// Returns the values of an axis that the user has stated, against which recordings are checked.
+    pub fn stated(&self, axis: &str) -> StatedValues {
+        let with = ValueSource::named(WITH);
+        StatedValues::new(&self.parameters, axis, |source| !self.is_builtin || *source == with)
     }
 }

@@ -20,7 +20,10 @@ impl PyMachine {
     #[staticmethod]
     #[pyo3(signature = (name_or_path = DEFAULT_MACHINE))]
     fn load(name_or_path: &str) -> PyResult<Self> {
-        PyMachine::new(Parameters::load(name_or_path, virtual_axes_builtin::MACHINES).map_err(value_error)?)
+        let parameters =
+            Parameters::load(name_or_path, virtual_axes_builtin::MACHINES).map_err(value_error)?;
+        let is_builtin = virtual_axes_builtin::MACHINES.iter().any(|(name, _)| *name == name_or_path);
+        Ok(PyMachine { is_builtin, ..PyMachine::new(parameters)? })
     }
 
     #[staticmethod]

@@ -8,7 +8,8 @@ use virtual_axes_core::design::Margins;
 use virtual_axes_core::trial::Figures;
 use virtual_axes_core::units::{DEGREE, MILLISECOND};
 use virtual_axes_identify::tune::{
-    CostTerm, MarginLimits, Tuning, TuningCandidate, TuningProblem, TuningResult, TuningSearch,
+    Cost, CostTerm, DeviatingRun, MarginLimits, Robustness, Tuning, TuningCandidate, TuningProblem,
+    TuningResult, TuningSearch,
 };
 
 use super::figures_json;
@@ -39,6 +40,36 @@ pub fn costed_run_json(
     let saturation = figures.axes.iter().map(|axis| axis.report.saturation_time).fold(0.0, f64::max);
     object.insert("saturation_s".to_owned(), json!(saturation));
     object
+}
+
+/// Returns the runs on deviating plants as a JSON object. `name` and `description` are those of the path, `controller` is
+/// the position controller, and `by` the relative deviation.
+pub fn robustness_json(
+    (name, description): (&str, &str),
+    (machine, controller): (&MachineConfig, &str),
+    (cost, by): (&Cost, f64),
+    found: &Robustness,
+) -> Value {
+    let plain = |one: &DeviatingRun| -> Value {
+        let deviation = json!({
+            "inertia": one.deviation.inertia,
+            "friction": one.deviation.friction,
+            "torque_constant": one.deviation.torque_constant,
+        });
+        let description = vec![("deviation", deviation)];
+        costed_run_json(description, one.cost, one.margins.as_ref(), &one.figures, machine).into()
+    };
+    json!({
+        "input": name,
+        "description": description,
+        "machine": machine.name(),
+        "controller": controller,
+        "by": by,
+        "cost_unit": cost.unit(&found.nominal.figures),
+        "nominal": plain(&found.nominal),
+        "single": found.single.iter().map(plain).collect::<Vec<_>>(),
+        "worst_combination": plain(&found.worst),
+    })
 }
 
 /// Returns a simulated tuning as a JSON object.

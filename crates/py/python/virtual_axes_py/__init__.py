@@ -30,16 +30,18 @@ from .run import Circle, Run
 from .shards import merge
 from .stepper import Stepper
 from .study import SweepResults, random_variants, sweep
-from .tuning import TuningResult, tune
+from .tuning import LearningResult, RobustnessResult, TuningResult, learn, robustness, tune
 
 __all__ = [
     "SIGNALS",
     "TOOL_SIGNALS",
     "Circle",
     "Identification",
+    "LearningResult",
     "Machine",
     "Optimum",
     "PartProgram",
+    "RobustnessResult",
     "Rst",
     "Run",
     "Scenario",
@@ -50,6 +52,7 @@ __all__ = [
     "__version__",
     "design",
     "identify",
+    "learn",
     "machine_names",
     "merge",
     "nc_program",
@@ -57,6 +60,7 @@ __all__ = [
     "optimize",
     "plot_bode",
     "random_variants",
+    "robustness",
     "scenario",
     "scenario_names",
     "sweep",
@@ -104,7 +108,6 @@ def nc_program(
 
     Raises `ValueError` for other values.
     """
-    inline = isinstance(tools, Mapping)
     arguments = {
         "feed_override": feed_override,
         "ignore": [str(code) for code in ([ignore] if isinstance(ignore, str) else ignore)],
@@ -112,8 +115,8 @@ def nc_program(
         "centripetal_acceleration": centripetal_acceleration,
         "dialect": dialect,
         "work_offset": _work_offsets(work_offset),
-        "tool_table": None if inline or tools is None else to_path("tools", tools),
-        "tools": [_tool(number, *size) for number, size in tools.items()] if inline else [],
+        "tool_table": None if tools is None or isinstance(tools, Mapping) else to_path("tools", tools),
+        "tools": [_tool(number, *size) for number, size in tools.items()] if isinstance(tools, Mapping) else [],
         "tool_change_s": tool_change_s,
         "spindle_s": spindle_s,
     }

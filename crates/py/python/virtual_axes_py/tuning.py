@@ -8,10 +8,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _native
-from .arguments import to_native
+from .arguments import to_native, to_whole
 from .machine import Machine
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from .machine import Setpoints
 
 
@@ -94,6 +97,100 @@ def tune(
     paths = [_named(machine, one, f"path {index + 1}") for index, one in enumerate([psec, *also])]
     text, tuned = _native.tune(to_native(machine), paths[0], paths[1:], options)
     return TuningResult(Machine(tuned), json.loads(text))
+
+
+@dataclass(frozen=True, eq=False)
+class RobustnessResult:
+    """Cost and margins of a machine as it is, and on plants that deviate from it."""
+
+    summary: dict[str, Any]
+    """All results with the keys and units of `virtual_axes robustness --json`."""
+
+    @property
+    def nominal_cost(self) -> float:
+        """Cost without deviation, in `summary["cost_unit"]`."""
+        return float(self.summary["nominal"]["cost"])
+
+    @property
+    def worst_cost(self) -> float:
+        """Cost of the worst combination of deviations, in `summary["cost_unit"]`."""
+        return float(self.summary["worst_combination"]["cost"])
+
+    def __repr__(self) -> str:
+        """Returns the costs without deviation and at worst."""
+        costs = f"{self.nominal_cost:.6g} nominal, {self.worst_cost:.6g} at worst"
+        return f"RobustnessResult(cost {costs}, {self.summary['cost_unit']})"
+
+
+def robustness(machine: Machine, psec: Setpoints, *, by: float = 0.3, cost: str = "contour") -> RobustnessResult:
+    """Simulates a path on plants with other inertia, friction and torque constant, as `virtual_axes robustness` does.
+
+    `psec` is the path, as for `Machine.simulate`, `by` the relative deviation, 0 … 0.8, and `cost` that of `tune`.
+    Raises `ValueError` with the command's text for an option out of range. Releases the global interpreter lock.
+    """
+    path = _named(machine, psec, "path 1")
+    return RobustnessResult(json.loads(_native.robustness(to_native(machine), path, by, cost)))
+
+
+@dataclass(frozen=True, eq=False)
+class LearningResult:
+    """Setpoints that compensate the repeatable errors of a motion."""
+
+    psec: NDArray[np.float64]
+    """Setpoints of the best run, (setpoints, axes), m or rad."""
+    summary: dict[str, Any]
+    """All results with the keys and units of `virtual_axes learn --json`."""
+
+    @property
+    def iterations(self) -> list[dict[str, Any]]:
+        """Runs in order, that of the programmed setpoints first: `figures`, and errors of the `learning_axes`."""
+        return list(self.summary["iterations"])
+
+    @property
+    def best(self) -> int:
+        """Index of the run with the smallest error."""
+        return int(self.summary["best"])
+
+    def __repr__(self) -> str:
+        """Returns the numbers of the best iteration and of all."""
+        return f"LearningResult(iteration {self.best} of {len(self.iterations) - 1} is the best)"
+
+
+def learn(
+    machine: Machine,
+    psec: Setpoints,
+    *,
+    iterations: int = 8,
+    bandwidth_hz: float | None = None,
+    gain: float = 0.5,
+    encoder_step_um: float = 1.0,
+    acceleration_excess: float = 0.5,
+) -> LearningResult:
+    """Learns setpoints that compensate the repeatable errors of a path, as `virtual_axes learn` does.
+
+    `psec` is the path, as for `Machine.simulate`. `iterations` runs follow that of the programmed setpoints. `gain` is
+    the part of the error that an iteration compensates, above 0 and at most 2, `bandwidth_hz` that of the low-pass
+    filter Q, by default the highest one that converges for all plants. `encoder_step_um` rounds the measured positions,
+    µm or µrad, and `acceleration_excess` is the acceleration beyond the limit of an axis, relative to it.
+
+    Raises `ValueError` with the command's text for an option out of range, or if no axis moves. Releases the global
+    interpreter lock.
+    """
+    if not 0 < gain <= 2:
+        raise ValueError(f"gain {gain}: must be above 0 and at most 2")
+    if not 0 <= encoder_step_um <= 1000:
+        raise ValueError(f"encoder_step_um {encoder_step_um}: must be in 0 … 1000")
+    if not 0 <= acceleration_excess <= 10:
+        raise ValueError(f"acceleration_excess {acceleration_excess}: must be in 0 … 10")
+    options = {
+        "iterations": to_whole("iterations", iterations, 1, 1000),
+        "bandwidth_hz": bandwidth_hz,
+        "gain": gain,
+        "encoder_step_um": encoder_step_um,
+        "acceleration_excess": acceleration_excess,
+    }
+    text, compensated = _native.learn(to_native(machine), _named(machine, psec, "path 1"), options)
+    return LearningResult(compensated, json.loads(text))
 
 
 def _named(machine: Machine, psec: Setpoints, name: str) -> tuple[str, str, Any]:

@@ -1,12 +1,12 @@
 //! Output of `virtual_axes learn`: verdict, tables, JSON and the section of the page.
 
-use serde_json::{Value, json};
+use serde_json::Value;
 use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_core::text::escaped;
 use virtual_axes_core::trial::Figures;
-use virtual_axes_core::units::{MILLIDEGREE, Rounded, seconds};
-use virtual_axes_identify::learn::{LearningEnd, LearningIteration, LearningOptions, LearningResult};
-use virtual_axes_io::files::figures_json;
+use virtual_axes_core::units::{MILLIDEGREE, Rounded};
+use virtual_axes_identify::learn::{LearningIteration, LearningOptions, LearningResult};
+use virtual_axes_io::files::{learning_end_text, learning_json};
 use virtual_axes_report::{
     Chart, ChartAxis, ChartSeries, DisplayUnit, Panel, Section, SeriesStyle, Table, TableColumn,
 };
@@ -57,7 +57,7 @@ impl Learned<'_> {
             self.found.best,
             runs.len() - 1
         )];
-        lines.extend(end_text(&self.found.end));
+        lines.extend(learning_end_text(&self.found.end));
         if self.found.best == 0 {
             lines.push("no iteration is better than the programmed setpoints".to_owned());
         }
@@ -205,67 +205,8 @@ impl Learned<'_> {
 
     /// Returns the result as a JSON object.
     pub fn json(&self) -> Value {
-        let (found, options) = (self.found, self.options);
-        let axis = |axis: &virtual_axes_identify::learn::LearningAxis| {
-            let deviating = axis.deviating.iter().map(|plant| {
-                json!({
-                    "inertia": plant.deviation.inertia,
-                    "torque_constant": plant.deviation.torque_constant,
-                    "factor": plant.contraction.map(|c| c.factor),
-                    "frequency_hz": plant.contraction.map(|c| c.frequency),
-                })
-            });
-            json!({
-                "axis": axis.name,
-                "bandwidth_hz": axis.filter.bandwidth(),
-                "factor": axis.filter.nominal().factor,
-                "frequency_hz": axis.filter.nominal().frequency,
-                "deviating_plants": deviating.collect::<Vec<_>>(),
-            })
-        };
-        let iteration = |(number, run): (usize, &LearningIteration)| {
-            let axes = run.axes.iter().map(|error| {
-                let (name, unit) = self.axis(error.index);
-                json!({
-                    "axis": name,
-                    "unit": unit,
-                    "max_error": error.max,
-                    "rms_error": error.rms,
-                    "max_compensation": error.compensation,
-                })
-            });
-            json!({
-                "iteration": number,
-                "learning_axes": axes.collect::<Vec<_>>(),
-                "figures": Value::Object(figures_json(&run.figures)),
-            })
-        };
-        let on = |(name, [programmed, learned]): &(String, [Figures; 2])| {
-            let [programmed, learned] = [programmed, learned]
-                .map(|figures| json!({ "figures": Value::Object(figures_json(figures)) }));
-            json!({ "parameters": name, "programmed": programmed, "learned": learned })
-        };
-        let end = match &found.end {
-            LearningEnd::Complete => "complete",
-            LearningEnd::Diverged => "diverged",
-            LearningEnd::Limit(_) => "limit",
-        };
-        json!({
-            "input": self.input.name(),
-            "description": self.input.description(),
-            "machine": self.config.name(),
-            "controller": self.controller,
-            "gain": options.tuning.gain,
-            "encoder_step": options.encoder_step,
-            "deviation": options.deviation,
-            "delay_s": seconds(self.config.periods().position) * found.delay as f64,
-            "convergence": found.axes.iter().map(axis).collect::<Vec<_>>(),
-            "iterations": found.iterations.iter().enumerate().map(iteration).collect::<Vec<_>>(),
-            "best": found.best,
-            "on": self.others.iter().map(on).collect::<Vec<_>>(),
-            "end": end,
-            "message": end_text(&found.end),
-        })
+        let names = (self.input.name(), self.input.description());
+        learning_json(names, (self.config, &self.controller), self.options, self.found, &self.others)
     }
 
     /// Returns the section of the page: tables and a plot of the errors over the iterations.
@@ -301,17 +242,5 @@ impl Learned<'_> {
         let iterations = ChartAxis::new("Iteration", DisplayUnit::NONE);
         let chart = Chart::new("Errors over the iterations", iterations, panels);
         vec![Section { tables: self.tables(), charts: vec![chart], ..Section::new("Iterative learning") }]
-    }
-}
-
-/// Returns the reason for an early end of the iterations.
-fn end_text(end: &LearningEnd) -> Option<String> {
-    match end {
-        LearningEnd::Complete => None,
-        LearningEnd::Diverged => Some(
-            "the largest error grew in two successive iterations: learning ended; reduce the bandwidth or the gain"
-                .to_owned(),
-        ),
-        LearningEnd::Limit(excess) => Some(format!("learning ended: {excess}")),
     }
 }

@@ -2,11 +2,10 @@
 
 use std::error::Error;
 
-use serde_json::{Value, json};
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::text::escaped;
 use virtual_axes_identify::tune::{Cost, DeviatingRun, PlantDeviation, Robustness, analyze_robustness};
-use virtual_axes_io::files::costed_run_json;
+use virtual_axes_io::files::robustness_json;
 use virtual_axes_report::Table;
 
 use crate::arguments::output_arguments::{OutputArguments, OutputFormat};
@@ -63,19 +62,9 @@ pub fn run(arguments: &RobustnessArguments) -> Result<String, Box<dyn Error>> {
     let controller = variant::controller_name(&parameters);
     Ok(match arguments.output.format() {
         OutputFormat::Json => {
-            let plain = |one: &DeviatingRun| json_of(one, &config);
-            let object = json!({
-                "input": input.name(),
-                "description": input.description(),
-                "machine": config.name(),
-                "controller": controller,
-                "by": arguments.by,
-                "cost_unit": arguments.cost.unit(&found.nominal.figures),
-                "nominal": plain(&found.nominal),
-                "single": found.single.iter().map(plain).collect::<Vec<_>>(),
-                "worst_combination": plain(&found.worst),
-            });
-            format!("{object:#}\n")
+            let names = (input.name(), input.description());
+            let options = (&arguments.cost, arguments.by);
+            format!("{:#}\n", robustness_json(names, (&config, &controller), options, &found))
         }
         OutputFormat::Csv => text_table::csv(&rows(arguments, &config, &found)),
         OutputFormat::Quiet => verdict(arguments, &found),
@@ -120,14 +109,4 @@ fn name(deviation: &PlantDeviation) -> String {
     let deviating = factors.iter().filter(|(_, factor)| *factor != 1.0);
     let names: Vec<String> = deviating.map(|(name, factor)| format!("{name} × {factor}")).collect();
     if names.is_empty() { "nominal".to_owned() } else { names.join(", ") }
-}
-
-fn json_of(one: &DeviatingRun, config: &MachineConfig) -> Value {
-    let deviation = json!({
-        "inertia": one.deviation.inertia,
-        "friction": one.deviation.friction,
-        "torque_constant": one.deviation.torque_constant,
-    });
-    let description = vec![("deviation", deviation)];
-    costed_run_json(description, one.cost, one.margins.as_ref(), &one.figures, config).into()
 }
