@@ -81,3 +81,12 @@ def test_samples_arrive_again_after_the_link_was_down():
         after = json.loads(client.read_line())
         print(f"\n{after}")
         assert after["missing"] == 0 and after["received"] > 100
+
+
+def test_a_node_of_this_host_only_ignores_hosts_that_know_its_address():
+    """With LOCALHOST, a peer that names the node's host discovers nothing: its datagrams are discarded."""
+    with Link() as link, node_behind(link, ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST") as node:
+        with link.client(node.domain_id, node.name, "watch", 1, env={"ROS_STATIC_PEERS": NODE_ADDRESS}) as client:
+            with pytest.raises(TimeoutError):
+                client.read_line(20.0)
+            assert node.poll() is None

@@ -2,7 +2,7 @@
 //!
 //! RustDDS binds its sockets to all interfaces and sends to every address that an announcement names. With `LOCALHOST` and
 //! `OFF`, datagrams of other hosts are discarded, and none is sent to them. Otherwise an address from which nothing has
-//! been received gets at most [`MAX_UNANSWERED`] datagrams and then one per second: an announcement, which anybody can
+//! been received gets at most [`MAX_UNANSWERED`] datagrams and then one per second: an announcement, which any host can
 //! send, directs no more than that to a foreign host.
 
 use std::collections::HashMap;
