@@ -37,7 +37,7 @@ def number(value: int) -> bytes:
     return struct.pack("<iI", value >> 32, value & 0xFFFFFFFF)
 
 
-def announcement(host: str = "127.0.0.1", port: int = 9) -> bytes:
+def announcement(port: int, host: str = "127.0.0.1") -> bytes:
     """Returns the announcement of a participant with all built-in endpoints at an address."""
     locator = struct.pack("<II", 1, port) + bytes(12) + socket.inet_aton(host)
     parameters = [
@@ -109,8 +109,12 @@ def test_two_datagrams_take_no_memory(start: Callable[..., AxesClient], hostile:
     node = drive.process
     before = resident_mb(node.pid)
     began = drive.now()
-    with sender(node.domain_id, DISCOVERY_PORT) as send:
-        send(announcement())
+    with sender(node.domain_id, DISCOVERY_PORT) as send, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as forged:
+        forged.bind(("127.0.0.1", 0))
+        forged.settimeout(20.0)
+        send(announcement(port=forged.getsockname()[1]))
+        # The node sends to the announced address when it has matched the endpoints.
+        assert forged.recv(1 << 16).startswith(b"RTPS")
         time.sleep(0.5)
         for datagram in hostile:
             send(datagram)
