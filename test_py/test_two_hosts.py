@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from node_process import DomainId, Node
-from test_hostile_datagrams import DISCOVERY_PORT, announcement
+from test_hostile_datagrams import DISCOVERY_PORT, START_SCREEN_END, announcement
 from two_hosts import CLIENT_ADDRESS, NODE_ADDRESS, Link, reason_to_skip
 
 SKIP = reason_to_skip()
@@ -116,7 +116,7 @@ def datagrams_to_announced_host(link: Link, node: Node, from_host: int, to_addre
     counting = [*prefixes[1], COUNT, CLIENT_ADDRESS, str(PORT), str(COUNT_S)]
     with subprocess.Popen(counting, stdout=subprocess.PIPE, text=True) as counter:
         assert counter.stdout.readline() == "ready\n"
-        while "stop with Ctrl-C" not in node.output():
+        while START_SCREEN_END not in node.output():
             time.sleep(0.1)
         port = 7400 + 250 * node.domain_id + DISCOVERY_PORT
         subprocess.run([*prefixes[from_host], SEND, to_address, str(port), announced], check=True)
