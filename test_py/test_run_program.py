@@ -179,6 +179,11 @@ def test_the_feed_override_of_a_goal_and_a_feed_hold(programs: Follow) -> None:
             "feed override -1 must be a number from 0 to 2 (200 %)",
         ),
         (Goal(path="/no/such.nc"), Result.FILE_ERROR, "/no/such.nc: No such file or directory (os error 2)"),
+        (
+            Goal(path="/" + "x" * 65_499),
+            Result.INVALID_GOAL,
+            "the path has 65500 bytes; at most 4096 are allowed",
+        ),
         (Goal(path="/dev/zero"), Result.FILE_ERROR, "/dev/zero: is not a regular file"),
         (Goal(path="/"), Result.FILE_ERROR, "/: is not a regular file"),
         (Goal(program="G1 X1 F100\nG12.1\nM2\n"), Result.PROGRAM_ERROR, "program:2: G12.1"),

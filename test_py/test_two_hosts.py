@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +13,7 @@ from typing import Any
 import pytest
 
 from node_process import DomainId, Node
+from test_hostile_datagrams import DISCOVERY_PORT, START_SCREEN_END, announcement
 from two_hosts import CLIENT_ADDRESS, NODE_ADDRESS, Link, reason_to_skip
 
 SKIP = reason_to_skip()
@@ -81,3 +84,55 @@ def test_samples_arrive_again_after_the_link_was_down():
         after = json.loads(client.read_line())
         print(f"\n{after}")
         assert after["missing"] == 0 and after["received"] > 100
+
+
+PORT, COUNT_S = 9999, 20.0
+"""Port of the second host that an announcement names; time for which the datagrams to it are counted, s."""
+COUNT = """
+import socket, sys, time
+receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+receiver.bind((sys.argv[1], int(sys.argv[2])))
+print("ready", flush=True)
+count, end = 0, time.monotonic() + float(sys.argv[3])
+while (rest := end - time.monotonic()) > 0:
+    receiver.settimeout(rest)
+    try:
+        count += receiver.recv(65535).startswith(b"RTPS")
+    except TimeoutError:
+        break
+print(count)
+"""
+SEND = """
+import socket, sys
+sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+sender.sendto(bytes.fromhex(sys.argv[3]), (sys.argv[1], int(sys.argv[2])))
+"""
+
+
+def datagrams_to_announced_host(link: Link, node: Node, from_host: int, to_address: str) -> int:
+    """Sends an announcement with an address of the second host to the node; returns the number of datagrams there."""
+    prefixes = [["ip", "netns", "exec", name, sys.executable, "-c"] for name in link.names]
+    announced = announcement(PORT, CLIENT_ADDRESS).hex()
+    counting = [*prefixes[1], COUNT, CLIENT_ADDRESS, str(PORT), str(COUNT_S)]
+    with subprocess.Popen(counting, stdout=subprocess.PIPE, text=True) as counter:
+        assert counter.stdout.readline() == "ready\n"
+        while START_SCREEN_END not in node.output():
+            time.sleep(0.1)
+        port = 7400 + 250 * node.domain_id + DISCOVERY_PORT
+        subprocess.run([*prefixes[from_host], SEND, to_address, str(port), announced], check=True)
+        count = int(counter.stdout.readline())
+    print(f"\n{count} datagrams in {COUNT_S:.0f} s")
+    return count
+
+
+def test_a_node_of_this_host_only_discards_datagrams_of_others_and_sends_them_none():
+    """With LOCALHOST, neither an announcement of the other host nor one with its address is answered there."""
+    with Link() as link, node_behind(link, ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST") as node:
+        assert datagrams_to_announced_host(link, node, 1, NODE_ADDRESS) == 0
+        assert datagrams_to_announced_host(link, node, 0, "127.0.0.1") == 0
+
+
+def test_an_announced_address_that_sends_nothing_gets_few_datagrams():
+    """Any host can announce the address of a third host: the node sends it 100 datagrams and one per second."""
+    with Link() as link, node_behind(link) as node:
+        assert 0 < datagrams_to_announced_host(link, node, 0, "127.0.0.1") <= 100 + COUNT_S

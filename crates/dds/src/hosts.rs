@@ -36,8 +36,10 @@ pub(crate) fn set_range(range: DiscoveryRange) {
 /// Permits any number of datagrams to an address that the user has named.
 pub(crate) fn permit(address: Ipv4Addr) {
     let now = Instant::now();
-    if let Some(hosts) = hosts().as_mut() {
-        hosts.host(address, now).map(|host| host.is_answering = true);
+    if let Some(hosts) = hosts().as_mut()
+        && let Some(host) = hosts.host(address, now)
+    {
+        host.is_answering = true;
     }
 }
 

@@ -55,6 +55,9 @@ fn rejected(code: ProgramErrorCode, text: String) -> RunProgramResult {
     RunProgramResult { error_code: code as i32, error_string: text, ..RunProgramResult::default() }
 }
 
+/// Length of the longest path of a file or name of a program, bytes: that of Linux.
+const MAX_PATH: usize = 4096;
+
 /// Opens the program of a goal.
 async fn open(
     goal: RunProgramGoal,
@@ -71,6 +74,9 @@ async fn open(
     match (goal.path.is_empty(), goal.program.is_empty()) {
         (true, true) => invalid("the goal has no program: set path or program".to_owned()),
         (false, false) => invalid("the goal has path and program: set one of them".to_owned()),
+        (false, true) if goal.path.len() > MAX_PATH => {
+            invalid(format!("the path has {} bytes; at most {MAX_PATH} are allowed", goal.path.len()))
+        }
         (true, false) => Ok(ProgramText::from_text(goal.program)),
         (false, true) => {
             ProgramText::open(goal.path, builtin).await.map_err(|text| (ProgramErrorCode::FileError, text))

@@ -268,7 +268,10 @@ mod tests {
                 }
                 Poll::Pending
             }
-            None => Poll::Ready(write_first()),
+            None => {
+                write_first();
+                Poll::Ready(())
+            }
         });
         queue.write(Box::pin(first)).await;
         let task = tokio::spawn(task);
