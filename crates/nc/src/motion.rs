@@ -8,6 +8,11 @@ pub const AXIS_LETTERS: [char; AXIS_COUNT] = ['X', 'Y', 'Z', 'A', 'B', 'C', 'U',
 /// keeps its initial value.
 pub type Coordinates = [f64; AXIS_COUNT];
 
+/// Returns true for A, B and C.
+pub(crate) fn is_rotary(axis: usize) -> bool {
+    (3..6).contains(&axis)
+}
+
 /// Step of a program: a motion, or an event between motions.
 #[derive(Debug, Clone, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "nearly all steps are motions")]

@@ -11,7 +11,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyList};
 use virtual_axes_core::config::{Assignment, Value, ValueSource};
 
-use crate::machine::WITH;
+/// Source of the values of `with_` in errors.
+pub const WITH: &str = "with_";
 
 /// Returns a `ValueError` with the text of an error.
 pub fn value_error(error: impl Into<Box<dyn Error + Send + Sync>>) -> PyErr {

@@ -8,7 +8,7 @@ use virtual_axes_core::config::{MachineConfig, Parameters, ValueSource};
 use virtual_axes_core::machine::MachineParameters;
 use virtual_axes_identify::recording::StatedValues;
 
-use crate::convert::{assignments, value_error};
+use crate::convert::{WITH, assignments, value_error};
 
 /// Parameters of a machine, checked: axes, drives, controllers, limits and kinematics.
 #[pyclass(name = "Machine", module = "virtual_axes_py._native", frozen)]
@@ -19,9 +19,6 @@ pub struct PyMachine {
     /// True for a built-in machine, of which the user has stated the values of `with_` only.
     pub is_builtin: bool,
 }
-
-/// Source of the values of `with_` in errors.
-pub const WITH: &str = "with_";
 
 /// Returns the names of the built-in machines, the default first.
 #[pyfunction]

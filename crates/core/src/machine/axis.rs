@@ -323,7 +323,7 @@ impl Axis {
 
     /// Changes the mode at the start of a position cycle; the position controller takes over without a jump of Ω*.
     pub(super) fn change_mode(&mut self, p: &AxisParameters, state: &mut InnerLoopState) {
-        self.mode.leave(p, state);
+        self.mode.leave(&p.loops, state);
         self.mode = self.next_mode;
         if self.mode == DriveMode::Position {
             self.position.begin_transfer();

@@ -1,6 +1,5 @@
 //! Modes of a drive: position control, velocity control, and the two ways in which a drive is off.
 
-use super::axis::AxisParameters;
 use super::inner_loops::{InnerLoopState, InnerLoops};
 use crate::control::PiState;
 
@@ -33,9 +32,8 @@ impl DriveMode {
         matches!(self, DriveMode::ShortCircuit | DriveMode::Coast)
     }
 
-    /// Returns the inner loops of an axis in this mode.
-    pub(super) fn loops(self, p: &AxisParameters) -> InnerLoops {
-        let mut loops = p.loops;
+    /// Returns inner loops as they are in this mode.
+    pub(super) fn loops(self, mut loops: InnerLoops) -> InnerLoops {
         if self.is_off() {
             loops.velocity = loops.velocity.with_limit(0.0);
         }
@@ -46,10 +44,10 @@ impl DriveMode {
     }
 
     /// Sets the state of the controllers at the end of this mode.
-    pub(super) fn leave(self, p: &AxisParameters, state: &mut InnerLoopState) {
+    pub(super) fn leave(self, loops: &InnerLoops, state: &mut InnerLoopState) {
         if self.is_off() {
             state.velocity = PiState::default();
-            state.filters = p.loops.filters.at_rest(0.0);
+            state.filters = loops.filters.at_rest(0.0);
         }
         if self == DriveMode::ShortCircuit {
             state.current = PiState::default();

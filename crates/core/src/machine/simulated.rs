@@ -115,7 +115,7 @@ impl Machine {
             let mut state = self.bank.state(index);
             axis.update_parameters(old, p, &mut state);
             self.bank.set_state(index, &state);
-            self.bank.set_loops(index, &axis.mode().loops(p));
+            self.bank.set_loops(index, &axis.mode().loops(p.loops));
             self.bank.set_event_driven(index, p.event_driven.clone());
             self.bank.set_elements(index, p.elements.clone());
             if old.compensation.is_some() {
@@ -290,7 +290,7 @@ impl Machine {
             if axis.has_new_mode() {
                 let (p, mut state) = (&parameters.axes[index], self.bank.state(index));
                 axis.change_mode(p, &mut state);
-                self.bank.set_loops(index, &axis.mode().loops(p));
+                self.bank.set_loops(index, &axis.mode().loops(p.loops));
                 self.bank.set_state(index, &state);
             }
         }

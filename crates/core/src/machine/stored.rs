@@ -92,7 +92,7 @@ impl Machine {
         for (index, axis) in self.axes.iter_mut().enumerate() {
             axis.code(codec);
             if matches!(codec, StateCodec::Reader { .. }) && axis.mode() != DriveMode::Position {
-                self.bank.set_loops(index, &axis.mode().loops(&self.parameters.axes[index]));
+                self.bank.set_loops(index, &axis.mode().loops(self.parameters.axes[index].loops));
             }
             self.bank.code(index, codec);
         }

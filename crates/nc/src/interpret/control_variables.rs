@@ -4,10 +4,10 @@ use virtual_axes_core::units::{DEGREE, MILLIMETER};
 
 use super::codes::{Motion, PlaneCode};
 use super::error::Outcome;
+use super::limits::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
 use super::okuma::WORK_OFFSETS;
-use super::options::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
-use super::state::{State, is_rotary};
-use crate::motion::{AXIS_COUNT, Plane, ProgramEvent};
+use super::state::State;
+use crate::motion::{AXIS_COUNT, Plane, ProgramEvent, is_rotary};
 
 /// Number of work coordinate systems.
 const SYSTEMS: usize = WORK_OFFSET_COUNT + ADDITIONAL_OFFSET_COUNT;

@@ -11,8 +11,10 @@ use super::error::Outcome;
 use super::limits::{MAX_ANGLE, MAX_LENGTH};
 use super::line_words::LineWords;
 use super::parameters::LOCALS;
-use super::state::{State, is_rotary};
-use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates, Feed, MotionKind, PlanarArc, ProgramMotion};
+use super::state::State;
+use crate::motion::{
+    AXIS_COUNT, AXIS_LETTERS, Coordinates, Feed, MotionKind, PlanarArc, ProgramMotion, is_rotary,
+};
 
 /// Distance of each axis below which a straight motion is the rounding of no motion, m and rad.
 const STILL: f64 = 1e-12;

@@ -6,8 +6,8 @@ use super::codes::{
 use super::contour::Compensation;
 use super::dialect::Dialect;
 use super::error::Outcome;
+use super::limits::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
 use super::line_words::LineWords;
-use super::options::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
 use super::state::State;
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS};
 
@@ -441,14 +441,5 @@ impl State {
         }
         self.options.references[reference] = position;
         Ok(())
-    }
-}
-
-/// Returns the code of a work coordinate system by its index.
-pub fn system_name(index: usize) -> String {
-    match index {
-        0..6 => format!("G{}", 54 + index),
-        6..WORK_OFFSET_COUNT => format!("G59.{}", index - 5),
-        _ => format!("G54.1 P{}", index + 1 - WORK_OFFSET_COUNT),
     }
 }

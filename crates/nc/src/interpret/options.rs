@@ -10,15 +10,10 @@ use virtual_axes_core::kinematics::{Kinematics, ToolPose};
 use super::dialect::Dialect;
 use super::error::Outcome;
 use super::ignored::IgnoredCodes;
-use super::limits::REPEATED_LINES;
+use super::limits::{ADDITIONAL_OFFSET_COUNT, REPEATED_LINES, WORK_OFFSET_COUNT};
 use super::tools::ToolTable;
 use super::work_offset::WorkOffset;
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Blend, Coordinates, PathControl};
-
-/// Number of work coordinate systems with codes of their own: G54 to G59.3.
-pub const WORK_OFFSET_COUNT: usize = 9;
-/// Number of additional work coordinate systems: G54.1 P1 and on.
-pub const ADDITIONAL_OFFSET_COUNT: usize = 300;
 
 /// Options of the interpreter: machine, offsets and tolerances that the program relies on.
 #[derive(Debug, Clone)]

@@ -15,7 +15,7 @@ use super::okuma;
 use super::options::InterpreterOptions;
 use super::parameters::{FIRST_OF_CONTROL, FIRST_VARIABLE_OF_CONTROL, LOCALS, ParameterValues};
 use super::report::{InterpretationReport, count};
-use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates, PathControl, Plane, ProgramStep};
+use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates, PathControl, Plane, ProgramStep, is_rotary};
 
 /// Distance below which an axis stays in its place, m and rad.
 const ROUNDING: f64 = 1e-13;
@@ -454,9 +454,4 @@ impl State {
     pub(super) fn is_defined(&self, name: &str) -> bool {
         self.control_name(name).is_some() || self.parameters.named(name).is_some()
     }
-}
-
-/// Returns true for A, B and C.
-pub(super) fn is_rotary(axis: usize) -> bool {
-    (3..6).contains(&axis)
 }

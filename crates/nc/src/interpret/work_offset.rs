@@ -4,10 +4,8 @@ use std::str::FromStr;
 
 use virtual_axes_core::units::{DEGREE, MILLIMETER};
 
-use super::limits::MAX_LENGTH;
-use super::options::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
-use super::state::is_rotary;
-use crate::motion::{AXIS_COUNT, Coordinates};
+use super::limits::{ADDITIONAL_OFFSET_COUNT, MAX_LENGTH, WORK_OFFSET_COUNT};
+use crate::motion::{AXIS_COUNT, Coordinates, is_rotary};
 
 /// Work offset that is given to the interpreter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,13 +38,22 @@ impl FromStr for WorkOffset {
     }
 }
 
+/// Returns the code of a work coordinate system by its index.
+pub fn system_name(index: usize) -> String {
+    match index {
+        0..6 => format!("G{}", 54 + index),
+        6..WORK_OFFSET_COUNT => format!("G59.{}", index - 5),
+        _ => format!("G54.1 P{}", index + 1 - WORK_OFFSET_COUNT),
+    }
+}
+
 /// Returns the index of a work coordinate system by its code.
 fn index(name: &str) -> Option<usize> {
     if let Some(number) = name.strip_prefix("G54.1P").or_else(|| name.strip_prefix("G154P")) {
         let number = number.parse().ok().filter(|number| (1..=ADDITIONAL_OFFSET_COUNT).contains(number))?;
         return Some(WORK_OFFSET_COUNT - 1 + number);
     }
-    (0..WORK_OFFSET_COUNT).find(|index| super::system_name(*index) == name)
+    (0..WORK_OFFSET_COUNT).find(|index| system_name(*index) == name)
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ pub fn tables(runs: &[SimulatedRun]) -> [Table; 3] {
     // The tables of all runs have equal rows.
     let ends = runs.iter().any(|run| figure::overshoots(&run.outcome.figures));
     let axes: Vec<_> = runs.iter().map(|run| figure::of_axes(&run.outcome.figures)).collect();
-    let path: Vec<_> = runs.iter().map(|run| figure::of_run(run, ends)).collect();
+    let path: Vec<_> = runs.iter().map(|run| run.path_figures(ends)).collect();
     let circles: Vec<_> = runs.iter().map(|run| figure::of_circles(&run.outcome.figures)).collect();
     [
         columns_of("Path", runs, &path),

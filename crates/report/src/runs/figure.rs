@@ -5,8 +5,6 @@ use virtual_axes_core::trial::{AxisFigures, CircleFigures, Figures, Reference};
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MICROMETER, MILLIDEGREE, MILLIMETER};
 use virtual_axes_nc::offline::{ProgramFigures, ProgrammedErrors};
 
-use super::SimulatedRun;
-
 /// One figure of a run.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Figure {
@@ -127,17 +125,8 @@ fn of_axis(axis: &AxisFigures) -> Vec<Figure> {
     ]
 }
 
-/// Returns the errors of a run along its path: of a part program first those against the programmed path. `ends` adds the
-/// contour errors without the overshoot at the ends of the path.
-pub fn of_run(run: &SimulatedRun, ends: bool) -> Vec<Figure> {
-    let program = run.part_program.as_ref();
-    let mut found = program.map(|program| of_program(&program.figures)).unwrap_or_default();
-    found.extend(of_path(&run.outcome.figures, ends));
-    found
-}
-
 /// Returns the contour errors of a part program against its programmed path.
-fn of_program(figures: &ProgramFigures) -> Vec<Figure> {
+pub(super) fn of_program(figures: &ProgramFigures) -> Vec<Figure> {
     let of = |errors: Option<ProgrammedErrors>, motion: &'static str| {
         let rows = |errors: ProgrammedErrors| {
             [

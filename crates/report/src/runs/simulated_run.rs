@@ -4,7 +4,9 @@ use virtual_axes_core::config::{ControllerName, MachineConfig, Parameters, Value
 use virtual_axes_core::kinematics::{AxisRole, Kinematics};
 use virtual_axes_core::trial::TrialOutcome;
 
+use super::figure::{self, Figure};
 use super::{ProgramReport, axis_warnings, table};
+use crate::Table;
 
 /// Returns the name of the controller of the axes, or several names joined by `+`.
 pub fn controller_name(parameters: &Parameters) -> String {
@@ -57,6 +59,27 @@ impl SimulatedRun {
             title.push_str(change);
         }
         title
+    }
+
+    /// Returns the errors along the path: of a part program first those against the programmed path. `ends` adds the contour
+    /// errors without the overshoot at the ends of the path.
+    pub fn path_figures(&self, ends: bool) -> Vec<Figure> {
+        let program = self.part_program.as_ref();
+        let mut found = program.map(|program| figure::of_program(&program.figures)).unwrap_or_default();
+        found.extend(figure::of_path(&self.outcome.figures, ends));
+        found
+    }
+
+    /// Creates the table of contour error, orientation error, circles and corners.
+    pub fn path_table(&self) -> Table {
+        let figures = &self.outcome.figures;
+        let mut table = Table::new("Path", &[("path error", ""), ("value", ""), ("unit", "")]);
+        for figure in
+            self.path_figures(figure::overshoots(figures)).into_iter().chain(figure::of_circles(figures))
+        {
+            table.rows.push(vec![figure.title(), figure.text(), figure.unit.to_owned()]);
+        }
+        table
     }
 
     /// Returns remarks on the run, one per line.

@@ -4,7 +4,6 @@ use virtual_axes_core::config::AxisUnits;
 use virtual_axes_core::trial::{AxisFigures, Figures};
 use virtual_axes_core::units::Rounded;
 
-use super::{SimulatedRun, figure};
 use crate::Table;
 
 /// Reason for a missing contour error.
@@ -88,18 +87,6 @@ pub fn more(figures: &Figures) -> impl Iterator<Item = String> {
     let circles = line(figures.more_circles, figures.circles.len(), "circles");
     let corners = line(figures.more_corners, figures.corners.len(), "corners");
     circles.into_iter().chain(corners)
-}
-
-/// Creates the table of contour error, orientation error, circles and corners.
-pub fn path(run: &SimulatedRun) -> Table {
-    let figures = &run.outcome.figures;
-    let mut table = Table::new("Path", &[("path error", ""), ("value", ""), ("unit", "")]);
-    let figures =
-        figure::of_run(run, figure::overshoots(figures)).into_iter().chain(figure::of_circles(figures));
-    for figure in figures {
-        table.rows.push(vec![figure.title(), figure.text(), figure.unit.to_owned()]);
-    }
-    table
 }
 
 /// Sampling of the contour errors and radial deviations.

@@ -21,7 +21,7 @@ pub fn lines(runs: &[SimulatedRun]) -> Vec<String> {
 fn single(run: &SimulatedRun) -> String {
     let figures = &run.outcome.figures;
     let main = main_figure(run);
-    let contour = figure::of_run(run, false);
+    let contour = run.path_figures(false);
     let text = match contour.get(1) {
         _ if figures.axes.iter().all(|axis| !axis.moves) => "no axis moves".to_owned(),
         Some(rms) if main.subject.is_empty() => {
@@ -51,7 +51,7 @@ fn compared(first: &SimulatedRun, run: &SimulatedRun) -> String {
     let from = main_figure(first);
     let figures = &run.outcome.figures;
     let same = |to: &Figure| to.subject == from.subject && to.name == from.name;
-    let to = figure::of_run(run, false).into_iter().chain(figure::of_axes(figures)).find(same);
+    let to = run.path_figures(false).into_iter().chain(figure::of_axes(figures)).find(same);
     let to = to.unwrap_or_else(|| main_figure(run));
     let change = percent(&from, &to).map(|change| format!(", {change}")).unwrap_or_default();
     let warnings = warnings(run);
@@ -67,7 +67,7 @@ fn without_max(figure: &Figure) -> String {
 fn main_figure(run: &SimulatedRun) -> Figure {
     let figures = &run.outcome.figures;
     let moving = figures.moving_tool_axes().count();
-    let contour = figure::of_run(run, false).into_iter().next();
+    let contour = run.path_figures(false).into_iter().next();
     let contour = contour.filter(|_| figures.contour.is_some_and(|contour| contour.max > 0.0));
     match (worst_axis(figures), contour) {
         (Some(worst), None) => worst,

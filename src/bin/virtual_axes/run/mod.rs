@@ -236,7 +236,7 @@ fn single(run: &SimulatedRun) -> Vec<String> {
     let verdict = verdict::lines(std::slice::from_ref(run)).concat();
     let remarks = run.remarks().into_iter().filter(|remark| !verdict.contains(remark.as_str()));
     axes.extend(remarks.map(|remark| text_table::wrapped_line(&remark)));
-    let path = table::path(run);
+    let path = run.path_table();
     let path = (!path.rows.is_empty()).then(|| format!("{}{}\n", text_table::text(&path), table::SAMPLING));
     let program = run.part_program.as_ref().map(part_program_text);
     std::iter::once(axes).chain(path).chain(program).collect()
@@ -286,8 +286,7 @@ fn csv(runs: &[SimulatedRun]) -> String {
     let mut text = "run,figure,value,unit\n".to_owned();
     for run in runs {
         let figures = &run.outcome.figures;
-        for figure in
-            [figure::of_axes(figures), figure::of_run(run, true), figure::of_circles(figures)].concat()
+        for figure in [figure::of_axes(figures), run.path_figures(true), figure::of_circles(figures)].concat()
         {
             let cells = [run.title(), figure.title(), figure.value.to_string(), figure.unit.to_owned()];
             text.push_str(&text_table::csv_row(&cells));

@@ -7,11 +7,11 @@ use virtual_axes_core::units::DEGREE;
 use super::super::contour::Corner;
 use super::super::error::Outcome;
 use super::super::limits::MAX_RATE;
-use super::super::state::{State, is_rotary};
+use super::super::state::State;
 use super::Sinumerik;
 use super::modes::MotionMode;
 use super::words::{Approach, Words};
-use crate::motion::{AXIS_LETTERS, Coordinates, PlanarArc};
+use crate::motion::{AXIS_LETTERS, Coordinates, PlanarArc, is_rotary};
 
 /// Sine of an angle below which three points are on a line.
 pub(super) const STRAIGHT: f64 = 1e-9;

@@ -3,14 +3,14 @@
 use virtual_axes_core::units::{DEGREE, MILLIMETER};
 
 use super::super::error::Outcome;
-use super::super::state::{State, is_rotary};
+use super::super::state::State;
 use super::super::tools::Tool;
 use super::expression::Names;
 use super::frame::AxisFrame;
 use super::modes::{Modes, active_tool};
 use super::value::ProgramValue;
 use super::variables::Variables;
-use crate::motion::{AXIS_COUNT, Coordinates};
+use crate::motion::{AXIS_COUNT, Coordinates, is_rotary};
 
 /// Largest number of a tool in the tool data.
 const MAX_TOOL: f64 = 1e6;
