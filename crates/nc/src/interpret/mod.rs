@@ -48,11 +48,11 @@ pub use dialect::{DetectedDialect, Dialect, is_g_code};
 pub use error::ProgramError;
 pub use ignored::{CodePattern, IgnoredCodes};
 pub use limits::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
-pub use work_offset::system_name;
 pub use options::{InterpreterOptions, TipTransform};
 pub use report::{InterpretationReport, OccurrenceTable, Occurrences};
 pub use tools::{Tool, ToolTable};
 pub use work_offset::WorkOffset;
+pub use work_offset::system_name;
 
 use self::error::Outcome;
 use self::line_words::LineWords;

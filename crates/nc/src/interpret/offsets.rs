@@ -9,6 +9,7 @@ use super::error::Outcome;
 use super::limits::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
 use super::line_words::LineWords;
 use super::state::State;
+use super::work_offset::system_name;
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS};
 
 impl State {
