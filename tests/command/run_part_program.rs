@@ -212,7 +212,7 @@ fn orientation_errors_of_lines_are_those_of_the_run() {
     let largest = of_lines.fold(0.0, f64::max);
     // Lines are evaluated at position cycles, the run at all ticks.
     assert!(largest <= whole * 1.001 && largest > 0.9 * whole, "{largest} {whole}");
-    assert!(printed(&["run", &name]).contains("orientation error, mdeg"));
+    assert!(printed(&["run", &name]).contains("error, mdeg"));
     let name = program(&folder, "G1 X20 F3000\nM2\n");
-    assert!(!printed(&["run", &name]).contains("orientation error, mdeg"));
+    assert!(!printed(&["run", &name]).contains("error, mdeg"));
 }

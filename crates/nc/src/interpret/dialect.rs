@@ -208,7 +208,7 @@ enum Pattern {
     Assignment,
     /// Head `$NAME.MIN%` of a file.
     Head,
-    /// Word with another letter in the line: `G15` with H.
+    /// Word with another letter in the line: `G15` with H, which is not that of G43 or G44.
     Pair(&'static str, char),
     /// Condition that a line follows: `IF [VC1 EQ 1] N10`.
     ConditionalLine,
@@ -360,7 +360,10 @@ impl Pattern {
             OWord => found(is_o_word(code), "an O-word"),
             Assignment => found(has_assignment(code), "an assignment with ="),
             Head => found(code.starts_with('$') && code.ends_with('%'), "the head $"),
-            Pair(word, letter) => found(has_word(code, word) && code.contains(letter), word),
+            Pair(word, letter) => {
+                let is_tool_length = has_word(code, "G43") || has_word(code, "G44");
+                found(has_word(code, word) && code.contains(letter) && !is_tool_length, word)
+            }
             ConditionalLine => found(has_conditional_line(code), "IF with a line"),
             CommonVariable => found(has_common_variable(code), "a variable VC"),
         }
@@ -472,6 +475,7 @@ mod tests {
             ("(Mach3 mill)\nG0 X1\n", ("mach3", Some(1))),
             ("$PART.MIN%\nG0 X1\n", ("okuma", Some(1))),
             ("O1001\nG15 H1\nG56 Z10. H1\n", ("okuma", Some(2))),
+            ("G56 G43 H3 G0 X10\nM2\n", ("linuxcnc", None)),
             ("IF [VC1 EQ 2] N10\nX=VC2\n", ("okuma", Some(1))),
             ("N5 IF [VTLCN EQ 2] NEXT\n", ("okuma", Some(1))),
             ("o100 if [exists[#<p>] NE 1.]\n", ("linuxcnc", Some(1))),

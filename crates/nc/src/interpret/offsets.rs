@@ -376,7 +376,9 @@ impl State {
     pub(super) fn enter_tcp(&mut self, length: f64) -> Outcome<()> {
         let transform = self.options.kinematics.as_ref();
         let transform = transform.ok_or("G43.4 requires a machine with kinematics; program G43")?;
+        let axes = self.position;
         transform.tip(&mut self.position, length);
+        self.offsets.tcp_start = Some([self.position, axes]);
         self.modal.tcp_length = Some(length);
         self.offsets.tool_length = 0.0;
         Ok(())
@@ -385,7 +387,10 @@ impl State {
     /// Ends tool center point control: the position becomes that of the axes.
     pub(super) fn leave_tcp(&mut self) {
         if let (Some(length), Some(transform)) = (self.modal.tcp_length.take(), &self.options.kinematics) {
-            transform.axis_positions(&mut self.position, length);
+            match self.offsets.tcp_start {
+                Some([tip, axes]) if tip == self.position => self.position = axes,
+                _ => transform.axis_positions(&mut self.position, length),
+            }
         }
     }
 

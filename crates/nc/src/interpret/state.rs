@@ -95,6 +95,8 @@ pub(super) struct Offsets {
     pub saved_shift: Coordinates,
     /// Tool length offset along Z (G43); 0 with tool center point control.
     pub tool_length: f64,
+    /// Tip of the tool and axes at the start of tool center point control: without a motion it ends at the same bits.
+    pub tcp_start: Option<[Coordinates; 2]>,
 }
 
 /// Modes that stay in effect until a line changes them.
@@ -213,6 +215,7 @@ impl State {
                 shift: none,
                 saved_shift: none,
                 tool_length: 0.0,
+                tcp_start: None,
             },
             dialect: options.dialect.unwrap_or_default(),
             has_given_dialect: false,
