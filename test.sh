@@ -135,7 +135,8 @@ stage "part programs" tools/part_programs.py || finish 1
 stage "dependencies" tools/dependencies.py || finish 1
 if [ $mode = all ]; then
   # As the documentation installs it. Before the workspace, whose features differ: both put the program in the same place.
-  stage "command alone" cargo build --release --locked -p virtual_axes --no-default-features --features cli || finish 1
+  stage "command alone" cargo install --quiet --locked --path . --no-default-features --features cli \
+    --root .build/command || finish 1
 fi
 stage "cargo build" cargo build --release --workspace --locked || finish 1
 stage "reference" tools/reference.py || finish 1

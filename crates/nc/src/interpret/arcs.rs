@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use virtual_axes_core::units::{MILLIMETER, Rounded};
 
 use super::error::Outcome;
-use super::limits::MAX_TURNS;
+use super::limits::{MAX_LENGTH, MAX_TURNS};
 use super::line_words::LineWords;
 use super::state::State;
 use crate::motion::{AXIS_LETTERS, Coordinates, PlanarArc};
@@ -101,6 +101,12 @@ pub(super) fn require_radii(from: [f64; 2], to: [f64; 2]) -> Outcome<()> {
     let [start, end] = [from, to].map(|[x, y]| x.hypot(y));
     if start < POINT || end < POINT {
         return Err("arc of radius 0: check the center".to_owned());
+    }
+    if start > MAX_LENGTH {
+        let [found, most] = [start, MAX_LENGTH].map(|length| Rounded(length / MILLIMETER));
+        return Err(format!(
+            "arc of radius {found} mm: at most {most} mm; check the center, or program a straight line"
+        ));
     }
     let difference = (start - end).abs();
     let allowed = RADIUS_TOLERANCE.max((RELATIVE_RADIUS_TOLERANCE * start.max(end)).min(MAX_RADIUS_ERROR));

@@ -93,6 +93,7 @@ fn invalid_arcs_and_splines_are_rejected() {
             "arc with radius 500 mm at its start and 510 mm at its end, at most 0.5 mm difference",
         ),
         ("G2 X1 I0", "arc of radius 0: check the center"),
+        ("G2 X1 I33333333333333", "arc of radius 3.33333e13 mm: at most 10000000 mm; check the center"),
         ("G2 X10 I5 P1.5", "word P: 1.5 turns, an integer from 1 to 10000 is required"),
         ("G18 G5.2 L3", "splines require the plane XY (G17)"),
         ("G5 X1 Y1 I1 J1", "a spline requires P and Q"),
