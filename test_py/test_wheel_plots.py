@@ -8,14 +8,11 @@ import sys
 from collections.abc import Iterator
 
 import control
-import matplotlib
 import numpy as np
 import pytest
+from matplotlib import pyplot as plt
 
 import virtual_axes_py as va
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
 
 
 @pytest.fixture(scope="module")
