@@ -34,8 +34,12 @@ ARGUMENTS = [
     ("rviz", "false", ["true", "false"], "Show both in RViz (package rviz2)"),
     ("record", "", None, "Folder for the recordings left.mcap and right.mcap; empty: none"),
     ("log_level", "info", None, "Log level of the nodes"),
+    ("respawn", "false", ["true", "false"], "As in virtual_axes.launch.py, for each node"),
+    ("memory_limit", "", None, "As in virtual_axes.launch.py, of each node"),
 ]
 SIDES = ["left", "right"]
+PASSED = ["time", "use_sim_time", "robot_state_publisher", "log_level", "respawn", "memory_limit"]
+"""Arguments of both machines."""
 
 
 def require_rviz(context: LaunchContext) -> None:
@@ -65,7 +69,7 @@ def start(context: LaunchContext) -> list[object]:
             "frame_prefix": f"{side}/",
             "rviz": "false",
             "record": str(Path(argument["record"], f"{side}.mcap")) if argument["record"] else "",
-            **{key: argument[key] for key in ("time", "use_sim_time", "robot_state_publisher", "log_level")},
+            **{key: argument[key] for key in PASSED},
         }
         if argument["time"] == "fast" and index > 0:
             # Only one node may publish the clock.

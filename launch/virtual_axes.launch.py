@@ -10,7 +10,8 @@ from pathlib import Path
 
 import yaml
 from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction, Shutdown
+from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -57,7 +58,28 @@ ARGUMENTS = [
     ("rviz", "false", ["true", "false"], "Show the machine in RViz (package rviz2)"),
     ("record", "", None, "MCAP file that the node records its topics to; empty: none"),
     ("log_level", "info", None, "Log level of the node"),
+    (
+        "respawn",
+        "false",
+        ["true", "false"],
+        "Start the node again when it has died, with the same parameters; the log names what is lost. "
+        "Invalid arguments (status 2) end the launch",
+    ),
+    (
+        "memory_limit",
+        "",
+        None,
+        "Largest address space of the node, MB, at which it ends (prlimit of util-linux); empty: none",
+    ),
 ]
+RESPAWN_DELAY = 1.0
+"""Time between the end of the node and its next start, s."""
+USAGE_ERROR = 2
+"""Exit status of the node for invalid arguments, which a restart does not mend."""
+LOST = (
+    "lost are the positions (the axes start at 0), running and waiting trajectories, goals and programs, "
+    "feed override, loads, and parameters set at run time; kept are all parameters given at the start"
+)
 
 
 def time_source(time: str, use_sim_time: str) -> str:
@@ -90,6 +112,30 @@ def require_robot_state_publisher(context: LaunchContext) -> None:
             "package robot_state_publisher not found; install it with "
             "apt install ros-$ROS_DISTRO-robot-state-publisher, or give robot_state_publisher:=false"
         ) from error
+
+
+def after_exit(event: ProcessExited, _context: LaunchContext) -> list[object]:
+    """Logs what the restart of a node loses, or ends the launch where a restart does not help."""
+    if event.returncode == USAGE_ERROR:
+        return [Shutdown(reason=f"{event.process_name} has invalid arguments")]
+    status = f"{event.process_name} ended with status {event.returncode}"
+    return [LogInfo(msg=f"{status} and is started again; {LOST}")] if event.returncode else []
+
+
+def supervision(argument: dict[str, str]) -> dict[str, object]:
+    """Returns the arguments of a node for its restart and its memory limit."""
+    found: dict[str, object] = {}
+    if argument["respawn"] == "true":
+        if argument["record"]:
+            raise RuntimeError(
+                "respawn:=true contradicts record:=FILE, which exists at the restart; record with ros2 bag record"
+            )
+        found |= {"respawn": True, "respawn_delay": RESPAWN_DELAY, "on_exit": after_exit}
+    if limit := argument["memory_limit"]:
+        if not limit.isdecimal() or int(limit) == 0:
+            raise RuntimeError(f"memory_limit:={limit} is not a positive whole number of MB")
+        found["prefix"] = f"prlimit --as={int(limit) * 1_000_000}"
+    return found
 
 
 def machine_file(machine: str) -> Path:
@@ -194,6 +240,7 @@ def start(context: LaunchContext) -> list[object]:
             remappings=[("psec", "~/joint_trajectory")] if argument["jtc_names"] == "true" else [],
             ros_arguments=["--log-level", argument["log_level"]],
             output="screen",
+            **supervision(argument),
         )
     ]
     if argument["robot_state_publisher"] == "true":

@@ -12,6 +12,7 @@ import runpy
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import yaml
 
@@ -98,6 +99,21 @@ class LogInfo(Action):
     def __init__(self, *, msg: str) -> None:
         """Keeps the message."""
         self.msg = msg
+
+
+class Shutdown(Action):
+    """End of the launch."""
+
+    def __init__(self, *, reason: str) -> None:
+        """Keeps the reason."""
+        self.reason = reason
+
+
+class ProcessExited(NamedTuple):
+    """Event of the end of a process."""
+
+    process_name: str
+    returncode: int
 
 
 class PythonLaunchDescriptionSource:
@@ -192,8 +208,13 @@ class Node(Action):
         arguments: Sequence[str] = (),
         ros_arguments: Sequence[str] = (),
         output: str = "log",
+        respawn: bool = False,
+        respawn_delay: float | None = None,
+        on_exit: Callable[[ProcessExited, LaunchContext], list[Action]] | None = None,
+        prefix: str | None = None,
     ) -> None:
         """Keeps the arguments."""
+        self.respawn, self.respawn_delay, self.on_exit, self.prefix = respawn, respawn_delay, on_exit, prefix
         self.package, self.executable, self.name, self.namespace = package, executable, name, namespace
         self.parameters, self.remappings, self.output = parameters, remappings, output
         self.arguments, self.ros_arguments = arguments, ros_arguments
@@ -237,8 +258,9 @@ def evaluated(name: str, value: object) -> object:
 
 
 actions = substitutions = launch_description_sources = parameter_descriptions = sys.modules[__name__]
+events = process = sys.modules[__name__]
 for package, modules in {
-    "launch": ("actions", "substitutions", "launch_description_sources"),
+    "launch": ("actions", "substitutions", "launch_description_sources", "events", "events.process"),
     "launch_ros": ("actions", "substitutions", "parameter_descriptions"),
 }.items():
     for provided in (package, *(f"{package}.{module}" for module in modules)):

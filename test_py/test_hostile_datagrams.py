@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import random
 import socket
 import struct
@@ -20,7 +21,8 @@ PUBLICATIONS_WRITER, PUBLICATIONS_READER = bytes.fromhex("000003c2"), bytes.from
 MAX_MB = 500.0
 FAR = 150_000_000
 """Number of samples that take 1.2 GB as a list of their numbers: enough for the test, without harm to the machine."""
-MUTANTS = 100_000
+MUTANTS = int(os.environ.get("VIRTUAL_AXES_MUTANTS", "100000"))
+"""Number of mutated datagrams."""
 SEED = 47
 
 

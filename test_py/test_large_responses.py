@@ -6,16 +6,18 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from rcl_interfaces.srv import DescribeParameters
+from rcl_interfaces.srv import DescribeParameters, GetParameters
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 
-from node_process import own_mb
+from node_process import own_mb, status_of
 from virtual_axes_py.ros import SETTLE_S, AxesClient
 
 TIMES = 20
 MANY = 300
 """Number of responses, 40 kB or more each."""
+LONG, LONG_BYTES = 10, 30_000_000
+"""Number of requests that are too long, and length of the name in each."""
 CLEANING_S = 7
 """Period of the middleware's history cleanup, s."""
 
@@ -78,6 +80,27 @@ def test_a_response_that_is_too_long_is_logged(real: AxesClient):
         real.call(DescribeParameters, "describe_parameters", DescribeParameters.Request(names=names), timeout=1)
     assert "no response of describe_parameters is sent" in real.process.output()
     assert len(real.describe(["max_points"])) == 1
+
+
+def test_long_requests_are_ignored_and_later_ones_are_answered(real: AxesClient):
+    """Ten requests of 30 MB; the middleware would keep a thousand. The client does not repeat them."""
+    assert real.process is not None
+    client = real.node.create_client(GetParameters, f"{real.target}/get_parameters")
+    try:
+        real.wait_for(client.service_is_ready, 5, "service")
+        time.sleep(SETTLE_S)
+        before = status_of(real.process.pid, "VmRSS")
+        for _ in range(LONG):
+            client.call_async(GetParameters.Request(names=["x" * LONG_BYTES]))
+        later = client.call_async(GetParameters.Request(names=["max_points"]))
+        real.wait_for(later.done, 60, "response to a short request after the long ones")
+        assert later.result().values[0].integer_value == 20_000
+        grown = (status_of(real.process.pid, "VmHWM") - before) * 1.024e-3
+    finally:
+        real.in_executor(lambda: real.node.destroy_client(client))
+    print(f"at most {grown:.1f} MB more for {LONG} requests of {LONG_BYTES / 1e6:.0f} MB")
+    assert grown < LONG_BYTES / 1e6
+    assert real.process.output().count(f"request of {LONG_BYTES + 12} bytes ignored") >= LONG
 
 
 def test_responses_that_were_taken_are_forgotten(real: AxesClient):

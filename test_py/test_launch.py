@@ -170,6 +170,19 @@ def test_without_the_command_the_built_in_model_is_used(monkeypatch: pytest.Monk
         nodes(ONE, machine="linear_motor_center")
 
 
+@pytest.mark.parametrize("file", [ONE, TWO])
+def test_without_robot_state_publisher_no_node_is_started(monkeypatch: pytest.MonkeyPatch, file: str):
+    """The error names the package and the argument that leaves it out, with which the nodes start."""
+    only = {key: path for key, path in substitutions.PROGRAMS.items() if key[0] != "robot_state_publisher"}
+    monkeypatch.setattr(substitutions, "PROGRAMS", only)
+    executed = launch.visit(launch.LaunchContext(), [description(file)])
+    started = []
+    with pytest.raises(RuntimeError, match="robot_state_publisher not found.*robot_state_publisher:=false"):
+        started += [action for action in executed if isinstance(action, NodeAction)]
+    assert not started
+    assert by_executable(nodes(file, robot_state_publisher="false")).keys() == {"virtual_axes_node"}
+
+
 def test_the_node_runs_with_the_arguments_from_launch():
     """Names, controller and prefix have the given values."""
     [node] = nodes(

@@ -120,6 +120,17 @@ def test_a_read_only_parameter_is_rejected_with_a_reason(real: AxesClient, name:
     assert real.get_parameters([name]) == before
 
 
+def test_the_clock_is_chosen_at_the_start_and_the_present_values_are_accepted(real: AxesClient):
+    """The values of a dump can be set again."""
+    with pytest.raises(ParameterRejected, match=r"use_sim_time cannot be set while the node runs: the clock.*-p"):
+        real.set_parameters({"use_sim_time": True})
+    names = real.list_parameters()
+    values = real.get_parameters(names)
+    assert values["use_sim_time"] is False
+    real.set_parameters({name: value for name, value in values.items() if value != []})
+    assert real.get_parameters(names) == values
+
+
 def test_live_gain_takes_effect(real: AxesClient):
     """An integer is accepted for a double, and the node uses the new value."""
     real.set_parameters({GAIN: 4})

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from action_msgs.msg import GoalStatus
 from control_msgs.action import FollowJointTrajectory
+from rcl_interfaces.msg import Log
 from virtual_axes.action import RunProgram
 from virtual_axes.msg import TrajectoryResult as R
 
@@ -18,7 +19,7 @@ from action import Follow, ending, goal, line, results_of
 from motion import TSP, go_home
 from node_process import Node, resident_mb
 from test_feed_override import Feed
-from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, to_ns
+from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, ParameterRejected, joint_trajectory, to_ns
 
 ROOT = Path(__file__).parents[1]
 Goal, Result = RunProgram.Goal, RunProgram.Result
@@ -38,9 +39,18 @@ LONG = "G21 G90 G64 P0.05\n" + "O1 repeat [100000]\nG1 X20 F1500\nY20\nX0\nY0\nO
 """Program of more than 80 hours."""
 
 
+NOT_PERMITTED = "is not a regular file of at most 4 GiB below program_folder"
+
+
 @pytest.fixture(scope="module")
-def programs() -> Iterator[Follow]:
-    args = ["-p", "time:=fast", "-p", "action_monitor_rate:=50.0"]
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Returns the folder of the program files."""
+    return tmp_path_factory.mktemp("programs")
+
+
+@pytest.fixture(scope="module")
+def programs(folder: Path) -> Iterator[Follow]:
+    args = ["-p", "time:=fast", "-p", "action_monitor_rate:=50.0", "-p", f"program_folder:={folder}"]
     with Node(args) as process, AxesClient(process=process) as drive:
         with Follow(drive, f"{drive.target}/run_program", kind=RunProgram) as follow:
             yield follow
@@ -108,14 +118,16 @@ def test_a_program_runs_to_its_end_with_feedback_and_figures(programs: Follow) -
     assert {result.source for result in results_of(programs, sent)} == {R.SOURCE_PROGRAM}
 
 
-def test_a_file_has_the_setpoints_of_the_command(programs: Follow, tmp_path: Path) -> None:
+@pytest.mark.parametrize("is_relative", [True, False])
+def test_a_file_has_the_setpoints_of_the_command(programs: Follow, folder: Path, is_relative: bool) -> None:
     """The setpoints equal those of `virtual_axes psec` within the rounding of the time."""
-    path = tmp_path / "square.nc"
+    path = folder / "square.nc"
     path.write_text(SQUARE)
-    sent = programs.send(Goal(path=str(path)))
+    sent = programs.send(Goal(path=path.name if is_relative else str(path)))
     assert sent.ended(60).status == GoalStatus.STATUS_SUCCEEDED
     states = states_of(programs, sent)
-    out = tmp_path / "square.csv"
+    out = folder / "square.csv"
+    out.unlink(missing_ok=True)
     command = [ROOT / "target/release/virtual_axes", "psec", path, "--out", out]
     subprocess.run(command, check=True, timeout=60, capture_output=True)
     rows = np.genfromtxt(out, delimiter=",", names=True)
@@ -178,14 +190,17 @@ def test_the_feed_override_of_a_goal_and_a_feed_hold(programs: Follow) -> None:
             Result.INVALID_GOAL,
             "feed override -1 must be a number from 0 to 2 (200 %)",
         ),
-        (Goal(path="/no/such.nc"), Result.FILE_ERROR, "/no/such.nc: No such file or directory (os error 2)"),
+        (Goal(path="/no/such.nc"), Result.FILE_ERROR, f"/no/such.nc: {NOT_PERMITTED}"),
+        (Goal(path="such.nc"), Result.FILE_ERROR, f"such.nc: {NOT_PERMITTED}"),
+        (Goal(path="/etc/passwd"), Result.FILE_ERROR, f"/etc/passwd: {NOT_PERMITTED}"),
+        (Goal(path="../../etc/passwd"), Result.FILE_ERROR, f"../../etc/passwd: {NOT_PERMITTED}"),
         (
             Goal(path="/" + "x" * 65_499),
             Result.INVALID_GOAL,
             "the path has 65500 bytes; at most 4096 are allowed",
         ),
-        (Goal(path="/dev/zero"), Result.FILE_ERROR, "/dev/zero: is not a regular file"),
-        (Goal(path="/"), Result.FILE_ERROR, "/: is not a regular file"),
+        (Goal(path="/dev/zero"), Result.FILE_ERROR, f"/dev/zero: {NOT_PERMITTED}"),
+        (Goal(path="/"), Result.FILE_ERROR, f"/: {NOT_PERMITTED}"),
         (Goal(program="G1 X1 F100\nG12.1\nM2\n"), Result.PROGRAM_ERROR, "program:2: G12.1"),
         (Goal(program="G1 X1 F100\nG1 X2000\nM2\n"), Result.PROGRAM_ERROR, "program: line 2: x is at"),
         (
@@ -197,16 +212,77 @@ def test_the_feed_override_of_a_goal_and_a_feed_hold(programs: Follow) -> None:
     ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_an_invalid_goal_is_aborted_with_one_line(programs: Follow, message: Goal, code: int, text: str) -> None:
+    process = programs.drive.process
+    assert process is not None
+    logged = len(process.output())
     ended = programs.send(message).ended(30)
     assert (ended.status, ended.result.error_code) == (GoalStatus.STATUS_ABORTED, code), ended.result.error_string
     assert ended.result.error_string.startswith(text) and "\n" not in ended.result.error_string
+    programs.drive.wait_for(lambda: text in process.output()[logged:], 10, "log")
+    rejections = [line for line in process.output()[logged:].splitlines() if text in line]
+    assert len(rejections) == 1 and len(rejections[0]) < 500
 
 
-def test_a_named_pipe_does_not_block(programs: Follow, tmp_path: Path) -> None:
-    pipe = tmp_path / "pipe.nc"
-    os.mkfifo(pipe)
-    ended = programs.send(Goal(path=str(pipe))).ended(10)
-    assert ended.result.error_string == f"{pipe}: is not a regular file"
+@pytest.mark.parametrize("kind", ["pipe", "link", "linked_folder"])
+def test_files_of_other_kinds_and_places_are_not_opened(
+    programs: Follow, folder: Path, tmp_path: Path, kind: str
+) -> None:
+    """The rejection does not tell a link to an existing file from one to a missing file."""
+    path = folder / kind
+    (tmp_path / "other.nc").write_text(SQUARE)
+    if kind == "pipe":
+        os.mkfifo(path)
+    else:
+        path.symlink_to(tmp_path / "other.nc" if kind == "link" else tmp_path)
+    names = [f"{kind}/other.nc", f"{kind}/missing.nc"] if kind == "linked_folder" else [kind]
+    for name in names:
+        ended = programs.send(Goal(path=name)).ended(10)
+        assert ended.result.error_code == Result.FILE_ERROR
+        assert ended.result.error_string.startswith(f"{name}: {NOT_PERMITTED}")
+
+
+def test_without_a_folder_no_file_is_run(start: Callable[..., AxesClient], tmp_path: Path) -> None:
+    path = tmp_path / "square.nc"
+    path.write_text(SQUARE)
+    drive = start("-p", "time:=fast")
+    with pytest.raises(ParameterRejected, match="program_folder cannot be set while the node runs"):
+        drive.set_parameters({"program_folder": str(tmp_path)})
+    with Follow(drive, f"{drive.target}/run_program", kind=RunProgram) as programs:
+        texts = []
+        for name in (str(path), str(tmp_path / "missing.nc")):
+            result = programs.send(Goal(path=name)).result(10)
+            assert result.error_code == Result.FILE_ERROR
+            texts.append(result.error_string.removeprefix(name))
+        assert texts[0] == texts[1] and "circle-diamond-square" in texts[0] and "program_folder" in texts[0]
+
+
+def test_errors_of_files_contain_no_text_of_them(programs: Follow, folder: Path) -> None:
+    """The reason is on standard error alone: other nodes read /rosout."""
+    published: list[Log] = []
+    programs.drive.node.create_subscription(Log, "/rosout", published.append, 100)
+    (folder / "bad.nc").write_text("G21 G90\nroot:secretword:0:0\n")
+    (folder / "caller.nc").write_text("G21 G90\nO<sub> call\nM2\n")
+    (folder / "sub.ngc").write_text("O<sub> sub\nroot:secretword:1:1\nO<sub> endsub\n")
+    for name in ("bad.nc", "caller.nc"):
+        result = programs.send(Goal(path=name)).result(30)
+        assert result.error_code == Result.PROGRAM_ERROR
+        assert "the reason is in the node's log" in result.error_string
+        assert "secret" not in result.error_string.lower()
+    process = programs.drive.process
+    assert process is not None
+    programs.drive.wait_for(lambda: process.output().lower().count("secretword") >= 2, 10, "reasons on stderr")
+    programs.drive.wait_for(lambda: any("caller.nc" in log.msg for log in published), 10, "log on /rosout")
+    assert not any("secret" in log.msg.lower() for log in published)
+
+
+def test_a_subprogram_outside_of_the_folder_is_not_read(programs: Follow, folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "outer.ngc").write_text("O<outer> sub\nG1 X1 F1000\nO<outer> endsub\n")
+    (folder / "outer.ngc").symlink_to(tmp_path / "outer.ngc")
+    (folder / "calls.nc").write_text("G21 G90\nO<outer> call\nM2\n")
+    assert programs.send(Goal(path="calls.nc")).result(30).error_code == Result.PROGRAM_ERROR
+    (folder / "outer.ngc").unlink()
+    (folder / "outer.ngc").write_text((tmp_path / "outer.ngc").read_text())
+    assert programs.send(Goal(path="calls.nc")).result(30).error_code == Result.SUCCESSFUL
 
 
 def test_a_canceled_program_stops_within_the_limits(programs: Follow) -> None:

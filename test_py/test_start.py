@@ -53,9 +53,13 @@ def test_parameters_of_other_nodes_are_ignored(start: Callable[..., AxesClient],
     """As in rclcpp; a parameter in the section of this node must exist."""
     shared = tmp_path / "shared.yaml"
     shared.write_text("/**:\n  ros__parameters: {cell_name: hall_3, x.velocity_loop.gain: 4.0}\n")
-    foreign = ["-p", "foreign:=1", "-p", "start_type_description_service:=false"]
+    of_rclcpp = ["start_type_description_service:=false", "qos_overrides./joint_states.publisher.depth:=5"]
+    foreign = [word for value in ("foreign:=1", *of_rclcpp) for word in ("-p", value)]
     drive = start("--params-file", str(shared), *foreign)
     assert drive.get_parameters(["x.velocity_loop.gain"]) == {"x.velocity_loop.gain": 4.0}
+    warnings = [line for line in drive.process.output().splitlines() if "WARN" in line]
+    for name in ("cell_name", "foreign"):
+        assert len([line for line in warnings if name in line and "ignored" in line]) == 1, warnings
     shared.write_text("virtual_axes:\n  ros__parameters: {cell_name: hall_3}\n")
     assert "unknown parameter cell_name" in rejection("--params-file", str(shared))
 

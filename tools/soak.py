@@ -408,6 +408,10 @@ def main() -> int:
             print(f"the node died; its output ends:\n{process.output()[-3000:]}")
         grew = has_grown(looks)
         print("traffic:", ", ".join(f"{name} {number}" for name, number in sorted(traffic.count.items())))
+        participants = traffic.count["visitor"] + traffic.count["killed"]
+        if looks and participants:
+            grown = looks[-1].memory_mb - looks[0].memory_mb
+            print(f"{participants} participants came and left: {grown / participants * 1e3:.1f} kB more for each")
         keys = ("position_periods", "missed_periods", "unpublished_periods", "dropped_samples", "max_lateness_ms")
         print("diagnostics:", ", ".join(f"{key} {reported.get(key)}" for key in keys))
     return int(grew or died or not reported)

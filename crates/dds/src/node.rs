@@ -9,6 +9,7 @@ use rustdds::{DomainParticipant, QosPolicies, Topic, TopicKind};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use crate::defects::late_readers;
 use crate::defects::writer_rotation::{RotatedTopic, RotatedTopics, RotationContext, TopicWriters};
 use crate::discovery::{self, EndpointCounts, Findings, MatchedSubscriptions, TopicEndpointInfo, node_names};
 use crate::environment::DiscoveryRange;
@@ -53,6 +54,11 @@ fn dds_type(ros_type: &str, suffix: &str) -> String {
         Some((package, name)) => format!("{}::dds_::{name}{suffix}_", package.replace('/', "::")),
         None => format!("{ros_type}{suffix}_"),
     }
+}
+
+/// Returns the DDS name of the requests of a service.
+fn request_topic(service: &str) -> String {
+    format!("rq{service}Request")
 }
 
 /// Returns the DDS name of a ROS topic.
@@ -110,6 +116,8 @@ impl Node {
         let writers = TopicWriters::new(network, topic, qos.max_unacknowledged, participant.clone());
         let writers = Arc::new(writers);
         let matched = if qos.is_transient_local {
+            let written = Arc::clone(&writers.current().readers.written);
+            late_readers::add(dds_topic(name), writer.to_bytes(), qos.depth, written);
             MatchedSubscriptions::always()
         } else {
             rotated.add(Arc::clone(&writers) as Arc<dyn RotatedTopic>);
@@ -135,7 +143,7 @@ impl Node {
     }
 
     /// Creates the service `name`, fully qualified; `type_name` is its ROS type `package/srv/Name`. The middleware keeps
-    /// `depth` requests.
+    /// `depth` requests; those of more than 256 KiB are ignored.
     ///
     /// # Errors
     /// Reason of the middleware.
@@ -149,10 +157,29 @@ impl Node {
         Q: DeserializeOwned + Send + Sync + 'static,
         A: Serialize + Send + Sync + 'static,
     {
+        let mut bounded = self.0.findings.bounded_requests.lock().unwrap_or_else(PoisonError::into_inner);
+        bounded.insert(request_topic(name));
+        drop(bounded);
+        self.create_service_of_long_requests(name, type_name, depth)
+    }
+
+    /// Creates a service as [`create_service`](Self::create_service) does, with requests up to 256 MiB.
+    ///
+    /// # Errors
+    /// Reason of the middleware.
+    pub fn create_service_of_long_requests<Q, A>(
+        &self,
+        name: &str,
+        type_name: &str,
+        depth: usize,
+    ) -> Result<Service<Q, A>, String>
+    where
+        Q: DeserializeOwned + Send + Sync + 'static,
+        A: Serialize + Send + Sync + 'static,
+    {
         let NodeState { participant, unlisted_writers, .. } = &*self.0;
         let (read, write) = (request_qos(depth).of_reader(), RESPONSE_QOS.of_reader());
-        let requests =
-            self.0.create_topic(format!("rq{name}Request"), dds_type(type_name, "_Request"), &read)?;
+        let requests = self.0.create_topic(request_topic(name), dds_type(type_name, "_Request"), &read)?;
         let responses =
             self.0.create_topic(format!("rr{name}Reply"), dds_type(type_name, "_Response"), &write)?;
         let requests = self.0.lock().create_subscription(&requests, None).map_err(|e| e.to_string())?;

@@ -5,19 +5,22 @@ use std::sync::{Arc, Mutex, PoisonError};
 use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
 use tokio::task::JoinError;
+use tracing::warn;
 
 use super::program_text::ProgramText;
 use crate::ros::axes::Command;
+use crate::ros::log::STDERR_ONLY;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::trajectory::{JointLimits, KinematicState, MotionChunk, MotionId, PathPlace};
 use virtual_axes_core::units::seconds;
 use virtual_axes_nc::StartLine;
-use virtual_axes_nc::builtin::{ProgramReader, program_folder};
-use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions};
+use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions, ProgramError};
 use virtual_axes_nc::plan::{FeedPlanError, PartProgramPlanner, PlanOptions, PlannedChunk};
 
 /// Number of chunks in the timeline.
 const CHUNKS: usize = 8;
+/// Name of the parameters of the set-up in messages.
+const SETUP: &str = "part_program";
 /// Shortest chunk, s.
 const MIN_CHUNK: f64 = 0.1;
 
@@ -112,22 +115,26 @@ impl Planning {
     /// Plans the program; blocks while enough is planned ahead.
     fn plan(self, runtime: &Handle) -> Result<(), String> {
         let Planning { motion, source, start_line, machine, state, commands, rest } = self;
-        let ProgramText { name, reader } = source;
+        let ProgramText { name, reader, folders } = source;
         // The sender is dropped if the motion is canceled before its start, or at shutdown.
         let Ok(rest) = rest.blocking_recv() else { return Ok(()) };
-        let mut options =
-            InterpreterOptions::for_machine(&machine).with_setup(machine.part_program())?.starting_at(&rest);
-        if let ProgramReader::File(_) = reader {
-            options.subprogram_folder = program_folder(&name, &[]);
-        }
+        let setup = InterpreterOptions::for_machine(&machine).with_setup(machine.part_program());
+        let options = setup.map_err(|error| without_contents(SETUP, &error))?.starting_at(&rest);
+        let is_file = folders.is_some();
+        let (subprogram_folder, subprogram_root) = folders.map(|folders| (folders.own, folders.root)).unzip();
+        let options = InterpreterOptions { subprogram_folder, subprogram_root, ..options };
         let steps = Interpreter::new(reader, &name, options.clone());
         let steps = StartLine::new(steps, start_line, &options);
-        let named = |error: FeedPlanError| match error {
-            // The interpreter's error names the file.
-            FeedPlanError::Step(error) if error.is::<virtual_axes_nc::interpret::ProgramError>() => {
-                error.to_string()
-            }
-            error => format!("{name}: {error}"),
+        let named = |error: FeedPlanError| match &error {
+            FeedPlanError::Step(step) => match step.downcast_ref::<ProgramError>() {
+                Some(error) if is_file => {
+                    without_contents(&format!("{}:{}", error.name, error.line), &error.to_string())
+                }
+                // The interpreter's error names the file.
+                Some(error) => error.to_string(),
+                None => format!("{name}: {step}"),
+            },
+            _ => format!("{name}: {error}"),
         };
         let mut planner = PartProgramPlanner::new(steps, &machine, PlanOptions::default()).map_err(named)?;
         let cycles = chunk_cycles(&machine);
@@ -145,6 +152,12 @@ impl Planning {
             }
         }
     }
+}
+
+/// Writes an error that may quote a file to standard error and returns the text for other nodes, without its contents.
+fn without_contents(place: &str, error: &str) -> String {
+    warn!(target: STDERR_ONLY, "{error}");
+    format!("{place}: invalid; the reason is in the node's log on stderr, since it may quote the file")
 }
 
 /// Returns the error of a program, also if its thread has panicked: then no goal would ever end.

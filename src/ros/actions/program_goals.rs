@@ -1,6 +1,7 @@
 //! Goals of `~/run_program`: validation, start and results.
 
 use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use tokio::sync::{mpsc, oneshot, watch};
@@ -29,6 +30,8 @@ const MAX_ACTIVE_PROGRAMS: usize = 8;
 pub struct ProgramGoals {
     /// Built-in part programs.
     pub builtin: &'static BuiltinFiles,
+    /// Folder of the files that can be run.
+    pub program_folder: Option<PathBuf>,
     /// Machine.
     pub machine: Arc<MachineConfig>,
     /// Names of the joints, with prefix.
@@ -62,6 +65,7 @@ const MAX_PATH: usize = 4096;
 async fn open(
     goal: RunProgramGoal,
     builtin: &BuiltinFiles,
+    folder: Option<&Path>,
     active: usize,
 ) -> Result<ProgramText, (ProgramErrorCode, String)> {
     let invalid = |text: String| Err((ProgramErrorCode::InvalidGoal, text));
@@ -79,7 +83,8 @@ async fn open(
         }
         (true, false) => Ok(ProgramText::from_text(goal.program)),
         (false, true) => {
-            ProgramText::open(goal.path, builtin).await.map_err(|text| (ProgramErrorCode::FileError, text))
+            let opened = ProgramText::open(goal.path, builtin, folder).await;
+            opened.map_err(|text| (ProgramErrorCode::FileError, text))
         }
     }
 }
@@ -99,7 +104,7 @@ impl GoalHandler for ProgramGoals {
         active: &[GoalId],
     ) -> Result<MotionId, RunProgramResult> {
         let (start_line, feed_override) = (goal.start_line as usize, goal.feed_override);
-        let source = match open(goal, self.builtin, active.len()).await {
+        let source = match open(goal, self.builtin, self.program_folder.as_deref(), active.len()).await {
             Ok(source) => source,
             Err((code, text)) => {
                 warn!("{} rejected: {text}", goal_name(&id));

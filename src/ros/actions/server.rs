@@ -109,7 +109,7 @@ impl<H: GoalHandler> ActionServer<H> {
         let node = topics.node;
         let server = ActionServer {
             send_goal: node
-                .create_service(&part("send_goal"), &own_type("SendGoal"), SERVICE_DEPTH)
+                .create_service_of_long_requests(&part("send_goal"), &own_type("SendGoal"), SERVICE_DEPTH)
                 .map_err(|reason| of_service("send_goal", reason))?,
             cancel_goal: node
                 .create_service(&part("cancel_goal"), "action_msgs/srv/CancelGoal", SERVICE_DEPTH)

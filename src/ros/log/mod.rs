@@ -35,6 +35,9 @@ use virtual_axes_core::text::is_control;
 /// Longest time for which the end of the program waits for a slow reader of stderr.
 const LAST_WAIT: Duration = Duration::from_millis(500);
 
+/// Target of messages that are not published on `/rosout`, since they may quote files of this computer.
+pub const STDERR_ONLY: &str = "virtual_axes::stderr";
+
 /// Log message of this program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LogRecord {
@@ -146,6 +149,7 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for RosLayer {
     fn on_event(&self, event: &Event<'_>, _context: Context<'_, S>) {
         let text = EventText::from_event(event);
         let own = filter::is_own(text.target(event));
+        let is_published = own && text.target(event) != STDERR_ONLY;
         let logger = if own { self.logger.clone() } else { text.target(event).replace("::", ".") };
         let Some(message) = self.limited(event, text) else { return };
         let record = LogRecord {
@@ -159,7 +163,7 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for RosLayer {
         if let Some(terminal) = &self.terminal {
             terminal.line(terminal_line(&record));
         }
-        if let Some(rosout) = self.rosout.as_ref().filter(|_| own) {
+        if let Some(rosout) = self.rosout.as_ref().filter(|_| is_published) {
             let _ = rosout.try_send(record);
         }
     }
@@ -228,9 +232,10 @@ mod tests {
     }
 
     #[test]
-    fn middleware_messages_are_not_published_on_rosout() {
+    fn messages_of_the_middleware_and_those_that_quote_files_are_not_published_on_rosout() {
         let records = capture(Some(LogLevel::Debug), &[], || {
             tracing::error!(target: "rustdds::rtps::writer", "error");
+            tracing::error!(target: STDERR_ONLY, "line of a file");
             tracing::debug!("ours");
         });
         assert_eq!(records.len(), 1);

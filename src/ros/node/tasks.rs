@@ -158,6 +158,7 @@ impl NodeTasks<'_> {
         let (running_out, programs) = watch::channel(Arc::from([]));
         let handler = ProgramGoals {
             builtin: self.builtin,
+            program_folder: node_config.program_folder.clone(),
             machine: Arc::new(config.clone()),
             joints: joints.clone(),
             commands: self.commands.clone(),

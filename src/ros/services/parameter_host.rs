@@ -59,7 +59,10 @@ impl ParameterHost for NodeParameterHost {
     }
 }
 
-/// Parameter host of a managed node that is not configured: every parameter can be set.
+/// Parameter that no node can set, since it limits which files other nodes can run.
+const PROGRAM_FOLDER: &str = "program_folder";
+
+/// Parameter host of a managed node that is not configured: every parameter but `program_folder` can be set.
 pub struct UnconfiguredParameterHost {
     store: ParameterStore,
     /// Changes since the start.
@@ -101,6 +104,12 @@ impl ParameterHost for UnconfiguredParameterHost {
     async fn ready(&mut self) {}
 
     fn set(&mut self, changes: Vec<(String, ParameterValue)>) -> Result<(), String> {
+        if changes.iter().any(|(name, _)| name == PROGRAM_FOLDER) {
+            return Err(format!(
+                "{PROGRAM_FOLDER} cannot be set by other nodes, whose access to files it limits; set it at the start with -p \
+                 or --params-file"
+            ));
+        }
         let (changed, _) = tokio::task::block_in_place(|| self.store.check_all(changes.clone()))?;
         self.store.replace(changed);
         // Of several changes of a parameter the last one counts.

@@ -14,6 +14,9 @@ use virtual_axes_core::text::shortened;
 /// parameter set alone requires a validation of the whole machine.
 const MAX_CHANGES: usize = 1000;
 
+/// Parameter that selects the clock.
+const USE_SIM_TIME: &str = "use_sim_time";
+
 /// Rejects a request with too many parameters.
 ///
 /// # Errors
@@ -98,15 +101,23 @@ impl ParameterStore {
     /// applying them.
     ///
     /// # Errors
-    /// Text with name, value and allowed values of the first invalid change, or of a parameter that is not live.
+    /// Text with name, value and allowed values of the first invalid change, or of a parameter that is not live and would
+    /// change.
     pub fn check(
         &self,
         changes: Vec<(String, ParameterValue)>,
     ) -> Result<(Parameters, MachineParameters), String> {
-        let is_fixed = |key: &String| self.parameters.definition(key).is_some_and(|d| !d.is_live);
-        if let Some(key) = changes.iter().map(|(key, _)| key).find(|key| is_fixed(key)) {
+        let is_fixed = |key: &str| self.parameters.definition(key).is_some_and(|d| !d.is_live);
+        // The present value is accepted, as in a file of `ros2 param dump`.
+        let changed = |(key, value): &&(String, ParameterValue)| self.get(key).as_ref() != Some(value);
+        if let Some((key, _)) = changes.iter().filter(changed).find(|(key, _)| is_fixed(key)) {
+            let reason = if key == USE_SIM_TIME {
+                ": the clock, by which axes and grid of the position cycles are started"
+            } else {
+                ""
+            };
             return Err(format!(
-                "{key} cannot be set while the node runs; set it at the start with -p or --params-file"
+                "{key} cannot be set while the node runs{reason}; set it at the start with -p or --params-file"
             ));
         }
         self.check_all(changes)

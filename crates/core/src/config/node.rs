@@ -48,6 +48,9 @@ parameters! {
             => |values, rows| Some(String::read(values, rows)? == "splines");
         /// Use the time of the topic /clock.
         pub use_sim_time: bool = flag("use_sim_time").default(Flag(false));
+        /// Folder of the part programs that ~/run_program runs by their path, with its subfolders; empty: built-in programs and
+        /// texts only. It is set at the start, also of a managed node.
+        pub program_folder: Option<PathBuf> = text("program_folder").default(Text(""));
         /// MCAP file for recording all topics of the node; it must not exist; empty disables recording.
         pub record: Option<PathBuf> = text("record").default(Text(""));
         /// Maximum size of the recording, which is closed there; the axes continue.

@@ -16,8 +16,11 @@
 //! [`MAX_INCOMPLETE`]; a reliable writer repeats it. RustDDS discards an incomplete sample only when the same reader
 //! receives a further fragment 10 s later. After that time an invalid fragment is appended to a received datagram,
 //! which has this effect alone.
+//!
+//! RustDDS keeps as many requests of a service as its depth, also those taken. A fragmented request that is longer than
+//! [`MAX_REQUEST`] is replaced by a GAP, so that the client does not repeat it.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::net::Ipv4Addr;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -36,6 +39,8 @@ const MAX_RANGE: i64 = 1 << 17;
 const MAX_NUMBER: i64 = 1 << 60;
 /// Largest fragmented sample, bytes: a trajectory of 1 000 000 points of five axes with all derivatives has 200 MB.
 const MAX_SAMPLE: u32 = 256 << 20;
+/// Largest request of a service other than those for goals, bytes: a thousand parameters have some 100 kB.
+const MAX_REQUEST: u32 = 256 << 10;
 /// Largest number of fragments of a sample; those of ROS 2 implementations have at least 1 kB.
 const MAX_FRAGMENTS: u32 = 1 << 18;
 /// Largest total size of the incomplete samples, bytes.
@@ -66,6 +71,18 @@ pub(crate) fn bound(buffer: &mut [u8], length: usize, source: Ipv4Addr, now: Ins
     Some(incomplete.discard_idle(buffer, length, now))
 }
 
+/// Bounds the requests of a writer to [`MAX_REQUEST`].
+pub(crate) fn bound_requests(writer: Guid) {
+    let mut incomplete = INCOMPLETE.lock().unwrap_or_else(PoisonError::into_inner);
+    incomplete.get_or_insert_default().request_writers.insert(writer);
+}
+
+/// Removes the writers that have left.
+pub(crate) fn retain_requests(is_present: impl Fn(&Guid) -> bool) {
+    let mut incomplete = INCOMPLETE.lock().unwrap_or_else(PoisonError::into_inner);
+    incomplete.get_or_insert_default().request_writers.retain(is_present);
+}
+
 fn bound_submessage(
     datagram: &mut [u8],
     submessage: &Submessage,
@@ -93,11 +110,16 @@ fn bound_submessage(
             // The set of single numbers would be relative to the old end.
             submessage.write_u32(datagram, 24, 0);
         }
-        (SUBMESSAGE_DATA_FRAG, &[number]) => {
-            if let Some(fragment) = Fragment::read(datagram, submessage, number) {
-                incomplete.add(&fragment, now)?;
+        (SUBMESSAGE_DATA_FRAG, &[number]) => match Fragment::read(datagram, submessage, number) {
+            Some(fragment) if incomplete.is_too_long_request(&fragment) => {
+                if fragment.first == 1 {
+                    warn!("request of {} bytes ignored; at most {MAX_REQUEST} are allowed", fragment.size);
+                }
+                submessage.replace_fragment_by_gap(datagram, number);
             }
-        }
+            Some(fragment) => incomplete.add(&fragment, now)?,
+            None => {}
+        },
         _ => {}
     }
     Ok(())
@@ -167,11 +189,17 @@ struct IncompleteSample {
 struct IncompleteSamples {
     samples: HashMap<(Guid, i64), IncompleteSample>,
     bytes: u64,
+    /// Writers of requests that are bounded to [`MAX_REQUEST`].
+    request_writers: HashSet<Guid>,
     /// Time of the last search for idle samples.
     searched: Option<Instant>,
 }
 
 impl IncompleteSamples {
+    fn is_too_long_request(&self, fragment: &Fragment) -> bool {
+        fragment.size > MAX_REQUEST && self.request_writers.contains(&fragment.writer)
+    }
+
     /// Adds fragments.
     ///
     /// # Errors
@@ -345,6 +373,24 @@ mod tests {
         assert!(add(3, 1, 60_000, 100_000));
         assert!(add(3, 2, 60_000, 100_000));
         assert_eq!(incomplete.bytes, 380 << 20, "the complete sample counts no more");
+    }
+
+    #[test]
+    fn a_long_request_is_replaced_by_a_gap_of_its_number() {
+        let (now, mut incomplete) = (Instant::now(), IncompleteSamples::default());
+        let long = fragment(7, 1, 60_000, MAX_REQUEST + 1);
+        assert_eq!(bounded(&mut incomplete, &long, now), Ok(long.clone()));
+        incomplete = IncompleteSamples { request_writers: HashSet::from([WRITER]), ..Default::default() };
+        let allowed = fragment(6, 1, 60_000, MAX_REQUEST);
+        assert_eq!(bounded(&mut incomplete, &allowed, now), Ok(allowed.clone()));
+        let replaced = bounded(&mut incomplete, &long, now).expect("not discarded");
+        let ids = [0, 0, 0, 0, 0, 0, 3, 0xc2];
+        let gap = with_submessage(SUBMESSAGE_GAP, &[&ids, &number(7), &number(8), &[0; 4]]);
+        // The octets behind the GAP belong to its submessage, and are ignored.
+        assert_eq!(replaced.len(), long.len());
+        assert_eq!((replaced[20], replaced[21]), (SUBMESSAGE_GAP, 1));
+        assert_eq!(replaced[24..52], gap[24..]);
+        assert_eq!(incomplete.samples.len(), 1, "the allowed request alone");
     }
 
     #[test]

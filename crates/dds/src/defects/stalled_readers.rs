@@ -14,6 +14,7 @@
 //! continues. Readers that have received those samples keep them. A reader that was only slow loses them, which is
 //! why the timeout is long.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
 
 use rustdds::{DomainParticipant, GUID};
@@ -31,7 +32,7 @@ pub(crate) struct StalledReaders {
     /// Largest number of unacknowledged samples that the middleware keeps.
     max_unacknowledged: i64,
     /// Sequence number of the last sample written.
-    written: AtomicI64,
+    pub(crate) written: Arc<AtomicI64>,
 }
 
 impl StalledReaders {
@@ -45,7 +46,7 @@ impl StalledReaders {
         participant: DomainParticipant,
     ) -> Self {
         let max_unacknowledged = i64::try_from(max_unacknowledged).unwrap_or(i64::MAX);
-        StalledReaders { writer, topic, participant, max_unacknowledged, written: AtomicI64::new(0) }
+        StalledReaders { writer, topic, participant, max_unacknowledged, written: Arc::default() }
     }
 
     /// Returns the sequence number of the last sample written, 0 before the first.

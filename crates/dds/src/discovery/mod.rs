@@ -8,15 +8,18 @@ mod remote_endpoints;
 pub(crate) use matched_subscriptions::MatchedSubscriptions;
 pub use remote_endpoints::EndpointCounts;
 
+use std::collections::HashSet;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use futures::StreamExt;
-use rustdds::{DomainParticipant, DomainParticipantStatusEvent, LostReason, RTPSEntity, StatusEvented};
+use rustdds::{DomainParticipant, DomainParticipantStatusEvent, GUID, LostReason, RTPSEntity, StatusEvented};
 use tracing::debug;
 
 use crate::defects::announcement_eviction::AnnouncementEviction;
 use crate::defects::heartbeat_request::HeartbeatRequests;
 use crate::defects::returned_participants::RemoteParticipants;
+use crate::defects::{datagram_bounds, late_readers};
 use crate::environment::DiscoveryRange;
 use crate::rtps::Guid as Gid;
 use incompatible_qos::OwnSubscriptions;
@@ -53,9 +56,37 @@ pub(crate) struct Findings {
     pub names: NodeNames,
     /// Own subscriptions.
     pub subscriptions: OwnSubscriptions,
+    /// DDS names of the topics with bounded requests.
+    pub bounded_requests: Mutex<HashSet<String>>,
 }
 
 impl Findings {
+    /// Updates the filters of datagrams: writers of bounded requests, and readers that have left.
+    fn update_filters(&self, event: &DomainParticipantStatusEvent) {
+        match event {
+            DomainParticipantStatusEvent::WriterDetected { writer } => {
+                let topics = self.bounded_requests.lock().unwrap_or_else(PoisonError::into_inner);
+                if topics.contains(&writer.topic_name) {
+                    datagram_bounds::bound_requests(writer.guid.to_bytes());
+                }
+            }
+            DomainParticipantStatusEvent::WriterLost { guid, .. } => {
+                let lost = guid.to_bytes();
+                datagram_bounds::retain_requests(|writer| *writer != lost);
+            }
+            DomainParticipantStatusEvent::ReaderLost { guid, .. } => {
+                let lost = guid.to_bytes();
+                late_readers::retain(|reader| *reader != lost);
+            }
+            DomainParticipantStatusEvent::ParticipantLost { id, .. } => {
+                let is_present = |guid: &Gid| GUID::from_bytes(*guid).prefix != *id;
+                datagram_bounds::retain_requests(is_present);
+                late_readers::retain(is_present);
+            }
+            _ => {}
+        }
+    }
+
     /// Returns the publishers of other participants that `participant` has discovered.
     pub(crate) fn publishers(&self, participant: &DomainParticipant) -> Vec<TopicEndpointInfo> {
         let own = participant.guid().prefix;
@@ -81,6 +112,7 @@ impl Findings {
 /// A participant delivers each event to one listener only, so one task handles all of them.
 pub(crate) async fn run(participant: &DomainParticipant, range: DiscoveryRange, findings: &Findings) {
     let mut heartbeats = HeartbeatRequests::open();
+    let mut gaps = late_readers::gaps();
     let mut eviction = AnnouncementEviction::default();
     let mut remote = RemoteEndpoints::new(participant.guid(), findings.endpoints.clone());
     let status = participant.status_listener();
@@ -107,6 +139,7 @@ pub(crate) async fn run(participant: &DomainParticipant, range: DiscoveryRange, 
                         requests.add_participant(dpd.guid);
                     }
                     remote.update(&event);
+                    findings.update_filters(&event);
                     incompatible_qos::log(&event, participant, &findings.names, &findings.subscriptions);
                     findings.participants.update(&event, Instant::now());
                     findings.names.update(&event);
@@ -124,6 +157,7 @@ pub(crate) async fn run(participant: &DomainParticipant, range: DiscoveryRange, 
                     None => std::future::pending().await,
                 }
             } => {}
+            Some(gap) = gaps.recv() => gap.send(participant),
             _ = timer.tick() => {
                 findings.matched.poll(participant);
                 findings.endpoints.update_departed(count_present(participant));

@@ -1,12 +1,15 @@
 //! Submessages of a received datagram, without their meaning.
 
 use super::{
-    EntityId, FLAG_LITTLE_ENDIAN, Guid, SUBMESSAGE_DATA_FRAG, SUBMESSAGE_INFO_DST, SUBMESSAGE_INFO_SRC,
-    SUBMESSAGE_INFO_TS, SUBMESSAGE_PAD, sequence_number,
+    EntityId, FLAG_DATA, FLAG_INLINE_QOS, FLAG_LITTLE_ENDIAN, Guid, PID_DURABILITY, PID_ENDPOINT_GUID,
+    PID_SENTINEL, PID_TOPIC_NAME, SUBMESSAGE_DATA_FRAG, SUBMESSAGE_GAP, SUBMESSAGE_INFO_DST,
+    SUBMESSAGE_INFO_SRC, SUBMESSAGE_INFO_TS, SUBMESSAGE_PAD, SUBSCRIPTIONS_WRITER, sequence_number,
 };
 
 /// Length of the header of a message (9.4.4).
 const HEADER: usize = 20;
+/// Largest number of numbers in a set (9.4.2.6).
+const MAX_NUMBERS: u32 = 256;
 /// GUID prefix in the header of a message.
 const PREFIX: std::ops::Range<usize> = 8..20;
 
@@ -21,6 +24,35 @@ pub(crate) struct Submessage {
     /// Octets of the content in the datagram.
     start: usize,
     end: usize,
+}
+
+/// Reader as it is announced to other participants.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct ReaderAnnouncement {
+    /// Identifier.
+    pub guid: Guid,
+    /// Name of its topic in DDS.
+    pub topic: String,
+    /// True if it gets no samples from before its matching.
+    pub is_volatile: bool,
+}
+
+/// Returns the parameters of a list, with the octets behind its sentinel, up to the first invalid one (9.4.2.11).
+fn parameters(octets: &[u8], is_little_endian: bool) -> (Vec<(u16, &[u8])>, &[u8]) {
+    let number = |octets: [u8; 2]| {
+        if is_little_endian { u16::from_le_bytes(octets) } else { u16::from_be_bytes(octets) }
+    };
+    let (mut found, mut rest) = (Vec::new(), octets);
+    while let [a, b, c, d, behind @ ..] = rest {
+        let (id, length) = (number([*a, *b]), usize::from(number([*c, *d])));
+        if id == PID_SENTINEL {
+            return (found, behind);
+        }
+        let Some((value, behind)) = behind.split_at_checked(length) else { break };
+        found.push((id, value));
+        rest = behind;
+    }
+    (found, &[])
 }
 
 /// Returns the submessages of a datagram up to the first invalid one; none if it is not of RTPS.
@@ -73,6 +105,60 @@ impl Submessage {
         octets.try_into().ok()
     }
 
+    /// Returns the reader that a DATA announces; `None` for other samples, and for one without the parameters.
+    pub(crate) fn announced_reader(&self, datagram: &[u8]) -> Option<ReaderAnnouncement> {
+        let flags = datagram[self.start - 3];
+        if self.entity(datagram, 8)? != SUBSCRIPTIONS_WRITER || flags & FLAG_DATA == 0 {
+            return None;
+        }
+        // Offset from the end of the field (9.4.5.3).
+        let behind_header = self.start + 4 + usize::from(self.u16(datagram, 2)?);
+        let mut octets = datagram.get(behind_header..self.end)?;
+        if flags & FLAG_INLINE_QOS != 0 {
+            octets = parameters(octets, self.is_little_endian).1;
+        }
+        let ([0, kind @ (2 | 3), _, _], list) = octets.split_first_chunk::<4>()? else { return None };
+        let is_little_endian = *kind == 3;
+        let (list, _) = parameters(list, is_little_endian);
+        let value = |id: u16| list.iter().find(|(found, _)| *found == id).map(|(_, value)| *value);
+        let number = |octets: &[u8]| {
+            let octets = *octets.first_chunk::<4>()?;
+            Some(if is_little_endian { u32::from_le_bytes(octets) } else { u32::from_be_bytes(octets) })
+        };
+        let name = value(PID_TOPIC_NAME)?;
+        let length = (number(name)? as usize).checked_sub(1)?;
+        Some(ReaderAnnouncement {
+            guid: *value(PID_ENDPOINT_GUID)?.first_chunk()?,
+            topic: String::from_utf8(name.get(4..4 + length)?.to_vec()).ok()?,
+            is_volatile: value(PID_DURABILITY).and_then(number).unwrap_or(0) == 0,
+        })
+    }
+
+    /// Lets a set of sequence numbers (9.4.2.6) begin at `base`, without the numbers before it. Returns `None`, without
+    /// change, if the set is invalid.
+    pub(crate) fn move_number_set(&self, datagram: &mut [u8], offset: usize, base: i64) -> Option<()> {
+        let (first, count) = (self.sequence_number(datagram, offset)?, self.u32(datagram, offset + 8)?);
+        if count > MAX_NUMBERS {
+            return None;
+        }
+        let word_of = |index: u32| offset + 12 + 4 * (index / 32) as usize;
+        let words: Vec<u32> = (0..count.div_ceil(32))
+            .map(|word| self.u32(datagram, word_of(32 * word)))
+            .collect::<Option<_>>()?;
+        let mut moved = vec![0; words.len()];
+        for index in 0..count {
+            let is_set = words[(index / 32) as usize] << (index % 32) & 1 << 31 != 0;
+            if is_set && let Ok(new) = u32::try_from(first + i64::from(index) - base) {
+                moved[(new / 32) as usize] |= 1 << (31 - new % 32);
+            }
+        }
+        self.write_sequence_number(datagram, offset, base);
+        for (word, value) in (0..).zip(moved) {
+            self.write_u32(datagram, word_of(32 * word), value);
+        }
+        Some(())
+    }
+
     /// Returns an entity id.
     pub(crate) fn entity(&self, datagram: &[u8], offset: usize) -> Option<EntityId> {
         self.field(datagram, offset)
@@ -102,6 +188,16 @@ impl Submessage {
         if self.field::<4>(datagram, offset).is_some() {
             datagram[self.start + offset..][..4].copy_from_slice(&octets);
         }
+    }
+
+    /// Overwrites a DATA_FRAG of the sample `number`, of at least 32 octets, by a GAP of this number.
+    pub(crate) fn replace_fragment_by_gap(&self, datagram: &mut [u8], number: i64) {
+        datagram[self.start - 4] = SUBMESSAGE_GAP;
+        datagram[self.start - 3] &= FLAG_LITTLE_ENDIAN;
+        datagram.copy_within(self.start + 4..self.start + 12, self.start);
+        self.write_sequence_number(datagram, 8, number);
+        self.write_sequence_number(datagram, 16, number + 1);
+        self.write_u32(datagram, 24, 0);
     }
 
     /// Overwrites a sequence number, which the submessage must contain.

@@ -38,6 +38,12 @@ const FLAG_KEY: u8 = 0x08;
 const OCTETS_TO_INLINE_QOS: u16 = 16;
 /// Kind of a locator with an IPv4 address (9.3.2.3).
 const LOCATOR_UDP_V4: u32 = 1;
+/// Writer of the announcements of readers, SEDP (9.3.1.5).
+const SUBSCRIPTIONS_WRITER: EntityId = [0, 0, 0x04, 0xc2];
+// Parameters of these announcements (9.6.4.9).
+const PID_TOPIC_NAME: u16 = 0x0005;
+const PID_DURABILITY: u16 = 0x001d;
+const PID_ENDPOINT_GUID: u16 = 0x005a;
 /// End of a parameter list (9.4.2.11).
 const PID_SENTINEL: u16 = 0x0001;
 
@@ -129,9 +135,14 @@ impl Message {
     /// Appends a GAP as last submessage and returns the octets: samples `first` to `end` − 1 of `writer` are irrelevant
     /// (8.3.8.4). Readers that have received them keep them.
     pub(crate) fn gap(self, writer: EntityId, first: i64, end: i64) -> Vec<u8> {
+        self.gap_of_reader(ANY_READER, writer, first, end)
+    }
+
+    /// Appends a GAP as [`gap`](Self::gap) does, for one reader.
+    pub(crate) fn gap_of_reader(self, reader: EntityId, writer: EntityId, first: i64, end: i64) -> Vec<u8> {
         // At the end an empty set that begins behind the gap (9.4.2.6).
         let numbers = [first, end].map(sequence_number);
-        self.append(SUBMESSAGE_GAP, &[&ANY_READER, &writer, numbers.as_flattened(), &[0; 4]]).0
+        self.append(SUBMESSAGE_GAP, &[&reader, &writer, numbers.as_flattened(), &[0; 4]]).0
     }
 
     /// Appends INFO_DST: the submessages that follow are for the participant of `guid` (8.3.8.7).

@@ -31,7 +31,16 @@ impl Readers {
 
     /// Sends a datagram to all readers discovered so far. Send errors are logged.
     pub(crate) fn send(&self, datagram: &[u8]) {
-        for reader in self.addresses() {
+        self.send_if(datagram, |topic, _| topic == self.topic);
+    }
+
+    /// Sends a datagram to one reader. Send errors are logged.
+    pub(crate) fn send_to(&self, reader: &Guid, datagram: &[u8]) {
+        self.send_if(datagram, |_, found| found == reader);
+    }
+
+    fn send_if(&self, datagram: &[u8], is_receiver: impl Fn(&str, &Guid) -> bool) {
+        for reader in self.addresses(is_receiver) {
             if let Err(error) = self.socket.send_to(datagram, reader) {
                 let (length, topic) = (datagram.len(), &self.topic);
                 tracing::warn!("cannot send a datagram of {length} octets on {topic} to {reader}: {error}");
@@ -39,12 +48,15 @@ impl Readers {
         }
     }
 
-    /// Returns the unicast addresses of the discovered readers.
-    fn addresses(&self) -> BTreeSet<SocketAddr> {
+    /// Returns the unicast addresses of discovered readers.
+    fn addresses(&self, is_receiver: impl Fn(&str, &Guid) -> bool) -> BTreeSet<SocketAddr> {
         self.participant
             .discovered_readers()
             .iter()
-            .filter(|reader| reader.subscription_topic_data.topic_name() == &self.topic)
+            .filter(|reader| {
+                let guid = reader.reader_proxy.remote_reader_guid.to_bytes();
+                is_receiver(reader.subscription_topic_data.topic_name(), &guid)
+            })
             .flat_map(|reader| &reader.reader_proxy.unicast_locator_list)
             .filter(|locator| locator.is_udp())
             .map(|locator| SocketAddr::from(*locator))

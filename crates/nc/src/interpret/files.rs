@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::Outcome;
+use super::options::InterpreterOptions;
 
 /// Largest number of files of a folder that are considered.
 const MAX_ENTRIES: usize = 10_000;
@@ -15,8 +16,8 @@ const MAX_FILE: u64 = 1 << 24;
 /// # Errors
 ///
 /// A file that cannot be read or is too large.
-pub(super) fn subprogram_file(folder: Option<&Path>, label: &str) -> Outcome<Option<Vec<u8>>> {
-    let Some(path) = folder.and_then(|folder| find(folder, label)) else { return Ok(None) };
+pub(super) fn subprogram_file(options: &InterpreterOptions, label: &str) -> Outcome<Option<Vec<u8>>> {
+    let Some(path) = find(options, label) else { return Ok(None) };
     let failure = |error: std::io::Error| format!("O{label}: {}: {error}", path.display());
     let size = fs::metadata(&path).map_err(failure)?.len();
     if size > MAX_FILE {
@@ -25,12 +26,18 @@ pub(super) fn subprogram_file(folder: Option<&Path>, label: &str) -> Outcome<Opt
     fs::read(&path).map(Some).map_err(failure)
 }
 
-fn find(folder: &Path, label: &str) -> Option<PathBuf> {
-    let entries = fs::read_dir(folder).ok()?.take(MAX_ENTRIES);
+/// Returns true for a regular file that the options permit as a subprogram.
+pub(super) fn is_permitted(path: &Path, options: &InterpreterOptions) -> bool {
+    let is_within = |root: &PathBuf| path.canonicalize().is_ok_and(|path| path.starts_with(root));
+    path.is_file() && options.subprogram_root.as_ref().is_none_or(is_within)
+}
+
+fn find(options: &InterpreterOptions, label: &str) -> Option<PathBuf> {
+    let entries = fs::read_dir(options.subprogram_folder.as_ref()?).ok()?.take(MAX_ENTRIES);
     let mut found: Vec<_> = entries
         .filter_map(|entry| Some(entry.ok()?.path()))
         .filter(|path| path.file_stem().and_then(|stem| stem.to_str()).is_some_and(|stem| is_of(stem, label)))
-        .filter(|path| path.is_file())
+        .filter(|path| is_permitted(path, options))
         .collect();
     found.sort();
     found.into_iter().next()

@@ -438,8 +438,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
         if let Some(place) = known(&self.flow) {
             return Ok(place);
         }
-        let folder = self.state.options.subprogram_folder.as_deref();
-        let text = subprogram_file(folder, label)?;
+        let text = subprogram_file(&self.state.options, label)?;
         let text = text.ok_or_else(|| {
             format!("O{label}: no such subprogram in this file, and no file with its name beside it")
         })?;

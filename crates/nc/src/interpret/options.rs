@@ -52,6 +52,8 @@ pub struct InterpreterOptions {
     pub reports_all_errors: bool,
     /// Folder with the files of subprograms; `None` for those in the program alone.
     pub subprogram_folder: Option<PathBuf>,
+    /// Folder, without links in its path, that contains every file of a subprogram after links are followed; `None` for any.
+    pub subprogram_root: Option<PathBuf>,
     /// Kinematics for tool center point control; `None` rejects G43.4.
     pub kinematics: Option<TipTransform>,
 }
@@ -81,6 +83,7 @@ impl Default for InterpreterOptions {
             repeated_lines: REPEATED_LINES,
             reports_all_errors: false,
             subprogram_folder: None,
+            subprogram_root: None,
             kinematics: None,
         }
     }

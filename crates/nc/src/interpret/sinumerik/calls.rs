@@ -2,10 +2,12 @@
 
 use std::fs;
 use std::io::Cursor;
-use std::path::Path;
+use std::path::PathBuf;
 
 use super::super::error::Outcome;
+use super::super::files::is_permitted;
 use super::super::limits::{MAX_CALLS, REPEATED_LINES};
+use super::super::options::InterpreterOptions;
 use super::super::source::LineSource;
 use super::super::state::State;
 use super::Sinumerik;
@@ -113,7 +115,7 @@ impl Sinumerik {
         if self.missing.contains(name) {
             return Ok(false);
         }
-        let is_found = find_file(state.options.subprogram_folder.as_deref(), name).is_some();
+        let is_found = find_file(&state.options, name).is_some();
         if !is_found {
             self.missing.insert(name.to_owned());
         }
@@ -134,8 +136,7 @@ impl Sinumerik {
         let (entry, caller) = match inner {
             Some(entry) => (entry, None),
             None => {
-                let folder = state.options.subprogram_folder.as_deref();
-                let file = open_file(folder, &name)?;
+                let file = open_file(&state.options, &name)?;
                 let entry = file.lines.place();
                 let index = self.index.take();
                 // The source of the caller is put back behind the block.
@@ -255,23 +256,23 @@ pub(super) fn subprogram_name(path: &str) -> String {
 }
 
 /// Returns the path of a subprogram in the folder of the program, by its name without regard to case.
-fn find_file(folder: Option<&Path>, name: &str) -> Option<std::path::PathBuf> {
-    let entries = fs::read_dir(folder?).ok()?;
+fn find_file(options: &InterpreterOptions, name: &str) -> Option<PathBuf> {
+    let entries = fs::read_dir(options.subprogram_folder.as_ref()?).ok()?;
     let mut found: Vec<_> = entries
         .take(MAX_ENTRIES)
         .filter_map(|entry| Some(entry.ok()?.path()))
         .filter(|path| {
             let file = path.file_name().and_then(|file| file.to_str()).unwrap_or_default();
             let has_ending = file.len() > name.len();
-            has_ending && subprogram_name(file) == name && path.is_file()
+            has_ending && subprogram_name(file) == name && is_permitted(path, options)
         })
         .collect();
     found.sort();
     found.pop()
 }
 
-fn open_file(folder: Option<&Path>, name: &str) -> Outcome<OpenFile> {
-    let path = find_file(folder, name);
+fn open_file(options: &InterpreterOptions, name: &str) -> Outcome<OpenFile> {
+    let path = find_file(options, name);
     let path = path.ok_or_else(|| {
         format!("{name}: no such subprogram: put it into this file behind %_N_{name}_SPF, or into the file {name}.SPF beside it")
     })?;
