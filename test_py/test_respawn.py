@@ -19,13 +19,15 @@ from launch_ros.actions import Node as NodeAction
 
 from launch_graph import nodes
 from node_process import Node, status_of
-from test_hostile_datagrams import DISCOVERY_PORT, announcement, fragment, sender
+from test_hostile_datagrams import DISCOVERY_PORT, START_SCREEN_END, announcement, fragment, sender
 from virtual_axes_py.ros import AxesClient
 
 ONE = "virtual_axes.launch.py"
 RESTART_S = 30.0
+SAMPLE_MB = 180
+"""Announced size of a sample; the node accepts two of them."""
 GAIN = "x.velocity_loop.gain"
-MARGIN_MB = 250
+MARGIN_MB = 100
 """Address space beyond that of a node at rest."""
 
 
@@ -55,10 +57,14 @@ class Supervisor:
             self.pids.append(self.process.pid)
 
     def __enter__(self) -> Supervisor:
-        """Starts the node and its supervision."""
+        """Starts the node and its supervision, and waits until the node has the ports of the first participant."""
         self.process.__enter__()
         self.pids.append(self.process.pid)
         self._thread.start()
+        end = time.monotonic() + RESTART_S
+        while START_SCREEN_END not in self.process.output() and self._thread.is_alive():
+            assert time.monotonic() < end, self.process.output()
+            time.sleep(0.05)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -132,7 +138,9 @@ def test_a_node_that_exceeds_its_memory_limit_is_restarted(machine: Path) -> Non
     limit = round(address_space_mb()) + MARGIN_MB
     with supervised(machine, memory_limit=str(limit)) as supervisor:
         with client(supervisor) as drive:
-            assert status_of(supervisor.pids[0], "VmPeak") * 1.024e-3 < limit
+            peak_mb = status_of(supervisor.pids[0], "VmPeak") * 1.024e-3
+            print(f"\nlimit {limit} MB, at most {peak_mb:.0f} MB before")
+            assert peak_mb < limit
             drive.process = None
             with (
                 sender(supervisor.process.domain_id, DISCOVERY_PORT) as send,
@@ -145,7 +153,7 @@ def test_a_node_that_exceeds_its_memory_limit_is_restarted(machine: Path) -> Non
                 time.sleep(0.5)
                 for sample in range(1, 3):
                     with contextlib.suppress(ConnectionError):
-                        send(fragment(sample, 180 << 20))
+                        send(fragment(sample, SAMPLE_MB << 20))
             supervisor.wait_for_restart()
         assert_restarted_with_its_parameters(supervisor)
 
