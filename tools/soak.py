@@ -70,6 +70,8 @@ CROWD = 4096
 """Announcements of publishers, of subscriptions, and of participants that the middleware keeps."""
 AT_A_TIME = 512
 """Endpoints of the crowd in one participant: of more than 2048 events at once RustDDS reports only a part."""
+IN_A_CALL = 32
+"""Of these, those that are created in one call of the executor, which is bounded in time."""
 LEASE_S, SHORT_LEASE_S = 20, 2
 """Lease of a participant of Fast DDS, and that of the participants that are killed during the soak test, s."""
 KEPT = 64
@@ -287,13 +289,14 @@ def run_crowd(drive: AxesClient) -> None:
         with AxesClient(process=drive.process, keep_samples=False) as other:
 
             def come() -> None:
-                for _ in range(AT_A_TIME):
+                for _ in range(IN_A_CALL):
                     # On different topics: otherwise each would match all others.
                     other.node.create_subscription(kind, f"{name}/in", lambda _: None, 1)
                     other.node.create_publisher(kind, f"{name}/out", 1)
 
-            other.in_executor(come)
-            drive.wait_for(lambda: count() >= before + 2 * AT_A_TIME, 60, "the crowd")
+            for _ in range(AT_A_TIME // IN_A_CALL):
+                other.in_executor(come)
+            drive.wait_for(lambda: count() >= before + 2 * AT_A_TIME, 120, "the crowd")
 
 
 def fill(drive: AxesClient, traffic: Traffic, folder: Path) -> None:

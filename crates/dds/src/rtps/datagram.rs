@@ -134,13 +134,15 @@ impl Submessage {
         })
     }
 
-    /// Lets a set of sequence numbers (9.4.2.6) begin at `base`, without the numbers before it. Returns `None`, without
+    /// Lets the set of sequence numbers (9.4.2.6) of an ACKNACK begin at `base`, without the numbers before it. Returns `None`, without
     /// change, if the set is invalid.
     pub(crate) fn move_number_set(&self, datagram: &mut [u8], offset: usize, base: i64) -> Option<()> {
         let (first, count) = (self.sequence_number(datagram, offset)?, self.u32(datagram, offset + 8)?);
         if count > MAX_NUMBERS {
             return None;
         }
+        // The count of the submessage is behind the set.
+        self.u32(datagram, offset + 12 + 4 * count.div_ceil(32) as usize)?;
         let word_of = |index: u32| offset + 12 + 4 * (index / 32) as usize;
         let words: Vec<u32> = (0..count.div_ceil(32))
             .map(|word| self.u32(datagram, word_of(32 * word)))
