@@ -14,6 +14,8 @@ from action import Follow, goal, line
 from node_process import die_with_parent
 from virtual_axes_py.ros import AxesClient, joint_trajectory
 
+pytestmark = pytest.mark.extended
+
 BURSTS, GOALS = 3, 300
 TIMEOUT_S = 60.0
 
