@@ -194,8 +194,8 @@ SECTIONS = [
         "Figure 5: friction law of X",
         "The current at constant velocity depends on the velocity alone; a law of two exponentials (equation 3) fits "
         "the measured currents with a regression coefficient of 0.995.",
-        "X moves with the parameters of appendix 2. Behind the middle of the motion the mean current, column `x.current` "
-        "of the trace, is that of the printed law; likewise with other feeds.",
+        "X moves with the parameters of appendix 2. Behind the middle of the motion the mean current, column "
+        "`x.current` of the trace, is that of the printed law; likewise with other feeds.",
         "x-constant --feed 10 --trace x.csv",
         law_rows,
         ("figure-5.svg", "Friction law of X over the velocity, and currents of simulated motions on it"),
@@ -229,8 +229,8 @@ SECTIONS = [
     ),
     Section(
         "Figure 7: two velocities on C",
-        "C turns from 0° to 130° at 18 rpm and to 210° at 6 rpm. Simulated and measured angle differ by less than 0.006°, "
-        "most in acceleration and deceleration.",
+        "C turns from 0° to 130° at 18 rpm and to 210° at 6 rpm. Simulated and measured angle differ by less than "
+        "0.006°, most in acceleration and deceleration.",
         "The same motion; 6 rpm are reached at 130°. " + DURING + ".",
         "c-two-speeds",
         lambda run: axis_rows(run, "c"),
@@ -287,8 +287,8 @@ SECTIONS = [
         "Figure 10, left: the ballbar",
         "A circle of 150 mm radius at 15 m/min, with velocity and torque feedforward: an error of 50 mm, "
         "which must be µm.",
-        "The circle of two turns at full feed. Its radius is too large by 49 µm: the velocity feedforward is late by half "
-        "a position cycle ([The model](explanation/model.md#control)). Without feedforward it is too small.",
+        "The circle of two turns at full feed. Its radius is too large by 49 µm: the velocity feedforward is late by "
+        "half a position cycle ([The model](explanation/model.md#control)). Without feedforward it is too small.",
         "ballbar --controller cascade,cascade-noff",
         lambda cascade, without: [
             *circle_rows(cascade, cascade["controller"], "50", "49.0 ± 0.2", "47.7 ± 1", "68.6 ± 1"),
@@ -298,8 +298,8 @@ SECTIONS = [
     ),
     Section(
         "Figure 10, right: the ballbar under predictive control",
-        "The same circle with a predictive controller of the position loop: the error is almost zero. Its tuning N1, N2, Nu, "
-        "λ is not printed.",
+        "The same circle with a predictive controller of the position loop: the error is almost zero. Its tuning "
+        "N1, N2, Nu, λ is not printed.",
         "Two tunings, named in the rows by N1, N2, Nu and λ_rel. The mean is almost zero with both; the extremes are "
         "the spikes at the reversals, by friction. The picture above has the first one.",
         predictive("ballbar"),
