@@ -39,10 +39,12 @@ class Page:
         """Executes the page and returns its faults: the first, or with `keep_going` differing output of all."""
         faults: list[str] = []
         installed = self.options.get("installed")
-        if installed == "virtual_axes":
+        if installed in ("virtual_axes", "virtual_axes_py"):
             self.place.install_command()
+            if installed == "virtual_axes_py":
+                self.place.install_module()
         elif installed is not None:
-            return [f"installed={installed}: only installed=virtual_axes is known"]
+            return [f"installed={installed}: known are virtual_axes and virtual_axes_py"]
         try:
             for item in self.items:
                 if isinstance(item, EditBlock):

@@ -75,6 +75,13 @@ class Place:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "virtual_axes").symlink_to(self._program.with_name("virtual_axes").resolve())
 
+    def install_module(self) -> None:
+        """Lets `python3` import `virtual_axes_py` and the packages of its extras, as `pip install` does."""
+        python = self.home / ".cargo" / "bin" / "python3"
+        python.write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}/crates/py/python" exec "{sys.executable}" "$@"\n')
+        python.chmod(0o755)
+        self.standins.add("virtual_axes_py as cargo builds it")
+
     def copy_checkout(self) -> Path:
         """Copies the files that git knows, as they are, with the compiled crates and the Python environment."""
         if self.checkout.exists():
