@@ -53,7 +53,7 @@ nb_execution_raise_on_error = True
 # Of a block of console, commands without prompts are copied.
 copybutton_prompt_text = r"\$ |> "
 copybutton_prompt_is_regexp = True
-copybutton_exclude = ".linenos, .gp"
+copybutton_copy_empty_lines = False
 highlight_language = "none"
 html_theme = "furo"
 html_title = "virtual_axes"

@@ -134,6 +134,8 @@ def test_commands_are_copied_without_prompts_and_output(browser: Browser):
 def test_equations_are_typeset_without_script(browser: Browser):
     browser.show_as()
     browser.open((SITE / "explanation/model.html").as_uri())
-    sizes = browser.evaluate("[...document.querySelectorAll('div.math mfrac')].map(one => one.getBoundingClientRect().height)")
+    sizes = browser.evaluate(
+        "[...document.querySelectorAll('div.math mfrac')].map(one => one.getBoundingClientRect().height)"
+    )
     # A fraction is higher than a line of text: the browser draws MathML.
     assert len(sizes) > 10 and min(sizes) > 16
