@@ -1,10 +1,12 @@
 """Stand-in for the `ros2` command, which is not on PyPI: the verbs that the documentation executes.
 
     ros2 run PACKAGE PROGRAM ARGUMENT...
+    ros2 launch PACKAGE FILE NAME:=VALUE...
     ros2 topic pub -w COUNT --once TOPIC TYPE YAML
     ros2 topic echo --once --field FIELD TOPIC
 
-Same arguments and form of output as ros2cli of ROS 2 Jazzy; others are errors.
+Same arguments and form of output as ros2cli of ROS 2 Jazzy; others are errors. `launch` starts the nodes of the package
+itself, since PyPI has no other.
 """
 
 from __future__ import annotations
@@ -12,6 +14,11 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import runpy
+import signal
+import subprocess
+import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -21,6 +28,8 @@ import yaml
 from ament_index_python.packages import get_package_prefix
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 
+import launch_standin
+
 DISCOVERY_S = 8.0
 """Longest wait for a topic; the real command's daemon knows it already."""
 
@@ -29,6 +38,40 @@ def run(arguments: argparse.Namespace) -> None:
     """Executes a program of a package."""
     path = Path(get_package_prefix(arguments.package)) / "lib" / arguments.package / arguments.program
     os.execv(path, [str(path), *arguments.arguments])
+
+
+def launch(arguments: argparse.Namespace) -> None:
+    """Starts the nodes of a launch file, prints their output, and ends them by Ctrl+C."""
+    package, prefix = arguments.package, Path(get_package_prefix(arguments.package))
+    programs = {(package, path.name): str(path) for path in (prefix / "lib" / package).iterdir()}
+    # Any executable file: launch files only look for it.
+    programs["robot_state_publisher", "robot_state_publisher"] = sys.executable
+    launch_standin.PROGRAMS.update(programs)
+    file = runpy.run_path(str(prefix / "share" / package / "launch" / arguments.file))
+    values = dict(one.split(":=", 1) for one in arguments.arguments)
+    actions = launch_standin.run(file["generate_launch_description"](), values)
+    nodes = [one for one in actions if isinstance(one, launch_standin.Node) and one.package == package]
+    started = []
+    for number, node in enumerate(nodes, 1):
+        command = [programs[package, node.executable], *node.command]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        name = f"{node.executable}-{number}"
+        print(f"[INFO] [{name}]: process started with pid [{process.pid}]", flush=True)
+        thread = threading.Thread(target=forward, args=(name, process))
+        thread.start()
+        started.append(thread)
+    # The nodes get Ctrl+C from the terminal, too.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for thread in started:
+        thread.join()
+
+
+def forward(name: str, process: subprocess.Popen[str]) -> None:
+    """Prints the output of a node, each line with its name, until the node ends."""
+    assert process.stdout is not None
+    for line in process.stdout:
+        print(f"[{name}] {line}", end="", flush=True)
+    process.wait()
 
 
 def message_type(name: str) -> type:
@@ -96,6 +139,11 @@ def main() -> None:
     command.add_argument("program")
     command.add_argument("arguments", nargs=argparse.REMAINDER)
     command.set_defaults(handler=run)
+    command = commands.add_parser("launch")
+    command.add_argument("package")
+    command.add_argument("file")
+    command.add_argument("arguments", nargs="*")
+    command.set_defaults(handler=launch)
     verbs = commands.add_parser("topic").add_subparsers(required=True)
     for handler, words in ((pub, ["topic", "type", "values"]), (echo, ["topic"])):
         verb = verbs.add_parser(handler.__name__)
@@ -106,7 +154,7 @@ def main() -> None:
     verbs.choices["pub"].add_argument("-w", dest="wait", type=int, default=1)
     verbs.choices["echo"].add_argument("--field", required=True)
     arguments = parser.parse_args()
-    if arguments.handler is not run:
+    if arguments.handler in (pub, echo):
         rclpy.init()
     arguments.handler(arguments)
 

@@ -52,6 +52,22 @@ Math.max(...[document.documentElement, ...document.querySelectorAll('body, .page
 """
 """Pixels by which a page, or the column of its text, is too wide; tables and code scroll inside."""
 
+EXCERPTS = """
+[...document.querySelectorAll('#search-results li:not(.kind-object)')]
+    .map(item => [item.querySelector('a').href, item.querySelector('p')?.innerText ?? ''])
+"""
+"""Links of the results of a search, with their excerpts."""
+
+COPIED = """
+(() => {
+    const copied = [];
+    document.execCommand = () => copied.push(document.querySelector('textarea').value);
+    for (const button of document.querySelectorAll('button.copybtn')) button.click();
+    return copied;
+})()
+"""
+"""Texts that the buttons of a page copy."""
+
 PAGES = sorted(SITE.rglob("*.html"))
 
 
@@ -94,13 +110,32 @@ def test_pages_fit_and_are_legible(browser: Browser, scheme: str, width: int):
     assert not faults
 
 
-def test_the_search_finds_a_page_without_network(browser: Browser):
+def test_the_search_finds_a_page_with_an_excerpt_without_network(browser: Browser):
     browser.show_as()
     browser.open((SITE / "search.html").as_uri() + "?q=troubleshooting")
     deadline = time.monotonic() + TIMEOUT
-    found: object = []
-    while not found and time.monotonic() < deadline:
-        found = browser.evaluate("[...document.querySelectorAll('#search-results li a')].map(a => a.href)")
+    found: list[list[str]] = []
+    while not (found and all(excerpt for _, excerpt in found)) and time.monotonic() < deadline:
+        found = browser.evaluate(EXCERPTS)
         time.sleep(0.1)
-    assert any("troubleshooting.html" in link for link in found), found
+    assert any("troubleshooting.html" in link for link, _ in found), found
+    assert any("troubleshooting" in excerpt.lower() for _, excerpt in found), found
     assert not external_requests(browser)
+
+
+def test_commands_are_copied_without_prompts_and_output(browser: Browser):
+    browser.show_as()
+    browser.open((SITE / "tutorials/first-run.html").as_uri())
+    copied = browser.evaluate(COPIED)
+    assert "mkdir -p ~/axes && cd ~/axes" in copied
+    assert any(text.startswith("virtual_axes run ballbar") and "µm" not in text for text in copied)
+
+
+def test_equations_are_typeset_without_script(browser: Browser):
+    browser.show_as()
+    browser.open((SITE / "explanation/model.html").as_uri())
+    sizes = browser.evaluate(
+        "[...document.querySelectorAll('div.math mfrac')].map(one => one.getBoundingClientRect().height)"
+    )
+    # A fraction is higher than a line of text: the browser draws MathML.
+    assert len(sizes) > 10 and min(sizes) > 16

@@ -201,7 +201,7 @@ is_done() { # stamp file, hash
 
 venv_hash=$(hash_of tools/setup.sh test_py/requirements-demo.txt test_py/constraints.txt)
 messages_hash=$(hash_of tools/setup.sh test_py/requirements-demo.txt test_py/constraints.txt package.xml CMakeLists.txt msg/*.msg msg/action/*.action)
-packages_hash=$(hash_of test_py/requirements*.txt test_py/constraints.txt)
+packages_hash=$(hash_of test_py/requirements*.txt test_py/constraints.txt docs/requirements.txt)
 overlay_hash=$(hash_of "$overlay"/package.xml "$overlay"/CMakeLists.txt "$overlay"/*/*.msg "$overlay"/*/*.action)
 venv_stamp=$venv/setup.stamp
 packages_stamp=$venv/packages.stamp

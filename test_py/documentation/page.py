@@ -39,10 +39,16 @@ class Page:
         """Executes the page and returns its faults: the first, or with `keep_going` differing output of all."""
         faults: list[str] = []
         installed = self.options.get("installed")
-        if installed == "virtual_axes":
-            self.place.install_command()
-        elif installed is not None:
-            return [f"installed={installed}: only installed=virtual_axes is known"]
+        installs = {
+            None: [],
+            "virtual_axes": [self.place.install_command],
+            "virtual_axes_py": [self.place.install_command, self.place.install_module],
+            "workspace": [self.place.install_workspace],
+        }
+        if installed not in installs:
+            return [f"installed={installed}: known are {', '.join(filter(None, installs))}"]
+        for install in installs[installed]:
+            install()
         try:
             for item in self.items:
                 if isinstance(item, EditBlock):

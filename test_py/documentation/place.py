@@ -27,6 +27,12 @@ export PYTHONPATH="{packages}"
 export ROS_DISTRO=jazzy ROS_VERSION=2 ROS_PYTHON_VERSION=3
 """
 
+WORKSPACE = """# Stand-in for the setup.bash of a workspace with this package.
+export AMENT_PREFIX_PATH="{prefix}:$AMENT_PREFIX_PATH"
+export LD_LIBRARY_PATH="{prefix}/lib:$LD_LIBRARY_PATH"
+export PYTHONPATH="{packages}:{root}/crates/py/python:$PYTHONPATH"
+"""
+
 # In the copy of the checkout, tools/setup.sh finds its stages done: it would install from PyPI for minutes.
 STAMPS = """set -euo pipefail
 root=$PWD venv=$PWD/.venv build=$PWD/.build overlay=test_py/overlay/control_msgs
@@ -74,6 +80,36 @@ class Place:
         folder = self.home / ".cargo" / "bin"
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "virtual_axes").symlink_to(self._program.with_name("virtual_axes").resolve())
+
+    def install_module(self) -> None:
+        """Lets `python3` import `virtual_axes_py` and the packages of its extras, as `pip install` does."""
+        python = self.home / ".cargo" / "bin" / "python3"
+        python.write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}/crates/py/python" exec "{sys.executable}" "$@"\n')
+        python.chmod(0o755)
+        self.standins.add("virtual_axes_py as cargo builds it")
+
+    def install_workspace(self) -> None:
+        """Makes ~/ws/install as `colcon build` leaves it, by links to programs, messages and launch files."""
+        messages = self._messages()
+        if messages is None:
+            raise FileNotFoundError("no control_msgs in AMENT_PREFIX_PATH: source .build/env.sh")
+        install = self.home / "ws" / "install"
+        share, library = (install / "virtual_axes" / name for name in ("share", "lib"))
+        programs = [self._program.with_name(name) for name in ("virtual_axes_node", "virtual_axes")]
+        folders = [ROOT / name for name in ("config", "launch", "layouts", "rviz", "urdf")]
+        for target, entries in {
+            library: (messages / "lib").iterdir(),
+            library / "virtual_axes": programs,
+            share: (one for one in (messages / "share").iterdir() if one.name != "virtual_axes"),
+            share / "virtual_axes": [*(messages / "share" / "virtual_axes").iterdir(), *folders],
+        }.items():
+            target.mkdir(parents=True)
+            for entry in entries:
+                (target / entry.name).symlink_to(entry.resolve())
+        packages = next(library.glob("python3*/site-packages"))
+        text = WORKSPACE.format(prefix=install / "virtual_axes", packages=packages, root=ROOT)
+        (install / "setup.bash").write_text(text)
+        self.standins.add("workspace as colcon builds it")
 
     def copy_checkout(self) -> Path:
         """Copies the files that git knows, as they are, with the compiled crates and the Python environment."""
