@@ -36,7 +36,7 @@ impl State {
             return self.spline_line(block);
         }
         self.moves_in_machine_coordinates = false;
-        let codes = Codes::new(&block.g, &block.m, self.dialect)?;
+        let codes = Codes::new(block, self.dialect)?;
         if self.request_macro(block, &codes)? {
             return Ok(());
         }
@@ -398,6 +398,9 @@ impl State {
                 (Motion::Cancel, _) => Some(Motion::Rapid),
                 _ => Some(motion),
             };
+        }
+        if let Some(pattern) = codes.g.pattern {
+            return self.hole_pattern(block, pattern);
         }
         if of_axes.is_some() { Ok(()) } else { self.move_by(block, motion, is_machine) }
     }
