@@ -299,6 +299,7 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
 const REMEDIES: &[(u16, &str)] = &[
     (71, "cylindrical interpolation: program the motions of the axes"),
     (121, "polar coordinate interpolation: program the motions of the axes"),
+    (320, "threading on a lathe: no axis of the machine turns the workpiece"),
     (470, "engraving of text: let the CAM system output the motions"),
     (760, "threading on a lathe: no axis of the machine turns the workpiece"),
     (1070, "cylindrical mapping: let the CAM system output the motions of the axes"),

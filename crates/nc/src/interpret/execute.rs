@@ -267,7 +267,10 @@ impl State {
             None => {}
         }
         match codes.g.units {
-            Some(Units::Inch | Units::Inch70) => self.modal.length = INCH,
+            Some(code @ (Units::Inch | Units::Inch70)) => {
+                self.assume(format!("{}: lengths and feeds are in inches", g_name(code.number())));
+                self.modal.length = INCH;
+            }
             Some(Units::Millimeter | Units::Millimeter71) => self.modal.length = MILLIMETER,
             None => {}
         }

@@ -80,6 +80,15 @@ fn subprograms_repeat_and_return_to_lines() {
 }
 
 #[test]
+fn subprograms_may_follow_the_end_of_the_program() {
+    let expected = [[5.0, 0.0, 0.0], [5.0, 2.0, 0.0]];
+    let after = "%\nO1\nM98 P10\nG0 Y2.\nM30\n%\n\n(SUBPROGRAM)\nO10\nG0 X5.\nM99\n";
+    assert_ends(Dialect::Fanuc, after, &expected);
+    let enclosed = "%\nO1\nM98 P10\nG0 Y2.\nM30\n%\n%\nO10\nG0 X5.\nM99\n%\n% REST\n";
+    assert_ends(Dialect::Fanuc, enclosed, &expected);
+}
+
+#[test]
 fn a_modal_macro_follows_each_motion() {
     let text = "O1\nG66 P50 Z-3.\nG0 X1.\nG0 X2.\nG67\nG0 X3.\nM30\nO50\nG1 Z#26 F100.\nG0 Z0\nM99\n";
     let expected = [
