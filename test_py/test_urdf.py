@@ -20,7 +20,7 @@ from reference_kinematics import OFFSETS, tool_pose
 
 ROOT = Path(__file__).resolve().parent.parent
 TWO_TABLES = ["mikron_ucp710", "linear_motor_center"]
-MACHINES = [*TWO_TABLES, "vmc", "hmc", "gantry_router", "bc_center", "fork_head"]
+MACHINES = [*TWO_TABLES, "vmc", "hmc", "gantry_router", "bc_center", "ac_center", "vmc_a", "fork_head"]
 
 
 def command(*arguments: str) -> str:

@@ -11,6 +11,8 @@ pub const MACHINES: &[(&str, &str)] = &[
     ("hmc", include_str!("../config/hmc.yaml")),
     ("gantry_router", include_str!("../config/gantry_router.yaml")),
     ("bc_center", include_str!("../config/bc_center.yaml")),
+    ("ac_center", include_str!("../config/ac_center.yaml")),
+    ("vmc_a", include_str!("../config/vmc_a.yaml")),
     ("fork_head", include_str!("../config/fork_head.yaml")),
 ];
 

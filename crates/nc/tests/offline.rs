@@ -9,7 +9,7 @@ use virtual_axes_builtin::PROGRAMS;
 use virtual_axes_core::config::{MachineConfig, Parameters};
 use virtual_axes_core::trial::{self, Figures, GridRows, GridSource, Measures, SetpointSource, Trial};
 use virtual_axes_nc::offline::{
-    CycleError, LineErrors, PartProgramOptions, PartProgramSource, ProgramFigures, ProgramTrack,
+    Cause, CycleError, LineErrors, PartProgramOptions, PartProgramSource, ProgramFigures, ProgramTrack,
 };
 
 /// Approach and retract at rapid traverse around a cut with a corner.
@@ -154,6 +154,8 @@ fn errors_are_those_against_the_programmed_corner() {
         assert!(cuts.max <= cuts.blending + cuts.drives);
         let worst = &program.worst_lines[0];
         assert!(worst.error == cuts.max && worst.error <= worst.blending + worst.drives + 1e-12, "{worst:?}");
+        // Also with a tolerance so wide that the path turns in a curve.
+        assert!(matches!(worst.cause, Cause::Corner), "{worst:?}");
     }
 }
 

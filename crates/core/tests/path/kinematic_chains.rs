@@ -114,6 +114,37 @@ fn a_fork_head_swings_the_tip_about_its_pivot() {
 }
 
 #[test]
+fn an_a_c_center_turns_the_workpiece_against_the_tool() {
+    let parameters = Parameters::load("ac_center", virtual_axes_builtin::MACHINES).expect("it is shipped");
+    let kinematics = Kinematics::new(&parameters.machine_config().expect("a valid machine"));
+    // Z −200 mm with a tool of 120 mm: the tip is 160 mm above the axis of A, and the workpiece zero 30 mm above it.
+    let z = -0.2;
+    let pose = kinematics.forward(&[0.0, 0.0, z, 0.0, 0.0]);
+    assert!((pose.tip - Vector3::new(0.0, 0.0, 0.13)).norm() < 1e-15, "{pose:?}");
+    // A of +90°: seen from the workpiece, the tool turns about +X to its side −Y.
+    let pose = kinematics.forward(&[0.0, 0.0, z, FRAC_PI_2, 0.0]);
+    assert!((pose.tip - Vector3::new(0.0, -0.16, -0.03)).norm() < 1e-15, "{pose:?}");
+    assert!((pose.axis - Vector3::new(0.0, -1.0, 0.0)).norm() < 1e-15, "{pose:?}");
+    // C of +90° turns it about +Z to +X.
+    let pose = kinematics.forward(&[0.0, 0.0, z, FRAC_PI_2, FRAC_PI_2]);
+    assert!((pose.tip - Vector3::new(0.16, 0.0, -0.03)).norm() < 1e-15, "{pose:?}");
+    assert!((pose.axis - Vector3::new(1.0, 0.0, 0.0)).norm() < 1e-15, "{pose:?}");
+}
+
+#[test]
+fn an_a_table_shows_the_tool_its_lower_side() {
+    let parameters = Parameters::load("vmc_a", virtual_axes_builtin::MACHINES).expect("it is shipped");
+    let kinematics = Kinematics::new(&parameters.machine_config().expect("a valid machine"));
+    // 10 mm behind the axis of A and 30 mm above it, with A at 0 and at 180°.
+    let joints = |a: f64| [-0.381, -0.203 + 0.01, -0.4 + 0.03 + 0.1, a];
+    let upper = kinematics.forward(&joints(0.0));
+    let lower = kinematics.forward(&joints(std::f64::consts::PI));
+    assert!((upper.tip - Vector3::new(0.0, 0.01, 0.03)).norm() < 1e-15, "{upper:?}");
+    assert!((lower.tip - Vector3::new(0.0, -0.01, -0.03)).norm() < 1e-15, "{lower:?}");
+    assert!((lower.axis + Vector3::z()).norm() < 1e-15, "{lower:?}");
+}
+
+#[test]
 fn a_b_table_shows_the_tool_its_other_side() {
     let parameters = Parameters::load("hmc", virtual_axes_builtin::MACHINES).expect("it is shipped");
     let kinematics = Kinematics::new(&parameters.machine_config().expect("a valid machine"));

@@ -5,6 +5,7 @@
 
 use super::dialect::{ALL, Dialect, FANUC, GRBL, HAAS, LINUXCNC, MACH3, OKUMA};
 use super::error::Outcome;
+use super::line_words::LineWords;
 
 /// Dialects with codes of production controls.
 const FH: u8 = FANUC | HAAS;
@@ -130,6 +131,11 @@ codes! {
         ReturnLevel = 710 in OKUMA, "G71: level to which canned cycles with M53 retract";
         ToolChange111 = 1110 in OKUMA, "G111: tool change";
         ToolChange116 = 1160 in OKUMA, "G116: tool change";
+    }
+    pattern: HolePattern, "Holes of the canned cycle in a pattern" {
+        Circle = 700 in HAAS, "G70: on a circle about the position";
+        Arc = 710 in HAAS, "G71: on an arc about the position";
+        Row = 720 in HAAS, "G72: in a row from the position";
     }
     modal_macro: ModalMacro, "Macro after each motion" {
         Call = 660 in FH, "G66: calls a macro after each motion";
@@ -293,7 +299,10 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
 const REMEDIES: &[(u16, &str)] = &[
     (71, "cylindrical interpolation: program the motions of the axes"),
     (121, "polar coordinate interpolation: program the motions of the axes"),
+    (320, "threading on a lathe: no axis of the machine turns the workpiece"),
+    (470, "engraving of text: let the CAM system output the motions"),
     (760, "threading on a lathe: no axis of the machine turns the workpiece"),
+    (1070, "cylindrical mapping: let the CAM system output the motions of the axes"),
     (1120, "polar coordinate interpolation: program the motions of the axes"),
     (1410, "3D cutter compensation: program the offset path"),
     (1430, "tool length along the tool axis: program G43.4 or G234"),
@@ -335,9 +344,9 @@ impl Codes {
     /// # Errors
     ///
     /// Two codes of one group, if the dialect does not allow them.
-    pub(super) fn new(g: &[u16], m: &[u32], dialect: Dialect) -> Outcome<Self> {
+    pub(super) fn new(block: &LineWords, dialect: Dialect) -> Outcome<Self> {
         let mut codes = Codes::default();
-        for &code in g {
+        for &code in &block.g {
             if code == Motion::NurbsEnd.number() && dialect == Dialect::LinuxCnc {
                 return Err("G5.3 without G5.2".to_owned());
             }
@@ -350,12 +359,14 @@ impl Codes {
                 continue;
             }
             let is_without_effect = |row: &&(u16, u8, &str)| row.0 == code && row.1 & dialect.bit() != 0;
-            match WITHOUT_EFFECT.iter().find(is_without_effect) {
+            // Without words, G107 ends the mapping.
+            let is_mapping = code == 1070 && block.has_any(&['A', 'B', 'C', 'Q', 'R']);
+            match WITHOUT_EFFECT.iter().find(is_without_effect).filter(|_| !is_mapping) {
                 Some((_, _, letters)) => codes.without_effect.push((g_name(code), letters)),
                 None => codes.unsupported.push((g_name(code), remedy(code, dialect))),
             }
         }
-        for &code in m {
+        for &code in &block.m {
             let number = u16::try_from(code).unwrap_or(u16::MAX);
             if codes.m.add(number, dialect)? {
                 continue;

@@ -1,8 +1,10 @@
-//! Canned cycles: G73, G74, G76, G77, G81 to G89, G174, G184, with G98 and G99.
+//! Canned cycles: G73, G74, G76, G77, G81 to G89, G174, G184, with G98 and G99; patterns of holes: G70, G71, G72.
 
-use virtual_axes_core::units::MILLIMETER;
+use std::f64::consts::TAU;
 
-use super::codes::{FeedMode, Motion, ReturnLevel, g_name};
+use virtual_axes_core::units::{DEGREE, MILLIMETER};
+
+use super::codes::{FeedMode, HolePattern, Motion, ReturnLevel, g_name};
 use super::dialect::Dialect;
 use super::error::Outcome;
 use super::limits::MAX_PECKS;
@@ -26,6 +28,49 @@ struct Levels {
 impl State {
     /// Executes a line of the cycle `code`.
     pub(super) fn cycle(&mut self, block: &mut LineWords, code: Motion) -> Outcome<()> {
+        self.cycle_at(block, code, None)
+    }
+
+    /// Executes the holes of a pattern of Haas with the cycle of its line or that in effect: L holes at the radius I from
+    /// the angle J on (G70 with equal distances, G71 K degrees apart; a negative I turns clockwise), or at distances I
+    /// from the position along the angle J (G72).
+    pub(super) fn hole_pattern(&mut self, block: &mut LineWords, pattern: HolePattern) -> Outcome<()> {
+        let name = g_name(pattern.number());
+        let Some(code) = self.modal.motion.filter(|code| is_canned(*code)) else {
+            return Err(format!(
+                "{name} requires a canned cycle, as in G81 Z-5. R1. F100. L0 in a line before"
+            ));
+        };
+        let mut required = |letter: char, what: &str| {
+            block.take(letter).ok_or_else(|| format!("{name} requires {letter}, the {what}"))
+        };
+        let distance = required('I', "radius of the circle or distance of the holes")? * self.modal.length;
+        let spacing = match pattern {
+            HolePattern::Arc => required('K', "angle between the holes")? * DEGREE,
+            HolePattern::Circle | HolePattern::Row => 0.0,
+        };
+        let angle = block.take('J').unwrap_or(0.0) * DEGREE;
+        let count =
+            block.take_integer('L')?.ok_or_else(|| format!("{name} requires L, the number of holes"))?;
+        if f64::from(count) > MAX_PECKS {
+            return Err(format!("{name}: {count} holes; at most {MAX_PECKS} are allowed"));
+        }
+        let offset = |index: u32| {
+            let index = f64::from(index);
+            let (radius, turn) = match pattern {
+                HolePattern::Circle => (distance.abs(), index * TAU / f64::from(count)),
+                HolePattern::Arc => (distance.abs(), index * spacing),
+                HolePattern::Row => (index * distance, 0.0),
+            };
+            let (sine, cosine) = (angle + if distance < 0.0 { -turn } else { turn }).sin_cos();
+            [radius * cosine, radius * sine]
+        };
+        let offsets: Vec<_> = (0..count).map(offset).collect();
+        self.cycle_at(block, code, Some(&offsets))
+    }
+
+    /// Executes a line of a cycle, with holes at `offsets` from its target in place of repetitions.
+    fn cycle_at(&mut self, block: &mut LineWords, code: Motion, offsets: Option<&[[f64; 2]]>) -> Outcome<()> {
         self.finish_contour()?;
         let [first, second, drill] = self.modal.plane.axes();
         let name = g_name(code.number());
@@ -50,7 +95,10 @@ impl State {
         });
         let levels = self.read_cycle(block, &mut cycle)?;
         let pecks = pecks(&cycle, levels.retract - levels.bottom, is_linuxcnc);
-        let repeats = self.repetitions(block, &name)?;
+        let repeats = match offsets {
+            Some(offsets) => offsets.len() as u32,
+            None => self.repetitions(block, &name)?,
+        };
         let strokes = f64::from(repeats) * pecks.count;
         if strokes > MAX_PECKS {
             let what = if cycle.peck.is_some() { "pecks" } else { "repetitions" };
@@ -87,7 +135,10 @@ impl State {
         }
         for repeat in 0..repeats {
             let mut end = self.programmed();
-            if repeat == 0 || self.modal.is_incremental {
+            if let Some(offset) = offsets.and_then(|offsets| offsets.get(repeat as usize)) {
+                end[first] = target[first] + offset[0];
+                end[second] = target[second] + offset[1];
+            } else if repeat == 0 || self.modal.is_incremental {
                 for axis in (0..AXIS_COUNT).filter(|axis| *axis != drill) {
                     end[axis] += target[axis] - start[axis];
                 }
@@ -305,6 +356,11 @@ fn lateral_shift(cycle: &Cycle) -> [f64; 2] {
         [None, None, _] => [cycle.peck.unwrap_or(0.0), 0.0],
         [first, second, _] => [first, second].map(|shift| shift.unwrap_or(0.0)),
     }
+}
+
+/// Returns true for the code of a canned cycle.
+fn is_canned(code: Motion) -> bool {
+    code.number() >= Motion::ChipBreaking.number() && code != Motion::Cancel
 }
 
 /// Returns true if a cycle drills in pecks of Q.

@@ -36,7 +36,7 @@ impl State {
             return self.spline_line(block);
         }
         self.moves_in_machine_coordinates = false;
-        let codes = Codes::new(&block.g, &block.m, self.dialect)?;
+        let codes = Codes::new(block, self.dialect)?;
         if self.request_macro(block, &codes)? {
             return Ok(());
         }
@@ -267,7 +267,10 @@ impl State {
             None => {}
         }
         match codes.g.units {
-            Some(Units::Inch | Units::Inch70) => self.modal.length = INCH,
+            Some(code @ (Units::Inch | Units::Inch70)) => {
+                self.assume(format!("{}: lengths and feeds are in inches", g_name(code.number())));
+                self.modal.length = INCH;
+            }
             Some(Units::Millimeter | Units::Millimeter71) => self.modal.length = MILLIMETER,
             None => {}
         }
@@ -398,6 +401,9 @@ impl State {
                 (Motion::Cancel, _) => Some(Motion::Rapid),
                 _ => Some(motion),
             };
+        }
+        if let Some(pattern) = codes.g.pattern {
+            return self.hole_pattern(block, pattern);
         }
         if of_axes.is_some() { Ok(()) } else { self.move_by(block, motion, is_machine) }
     }

@@ -458,13 +458,23 @@ impl<R: BufRead + Seek> Interpreter<R> {
         let mut found = HashMap::new();
         let mut line = LineText::default();
         self.source.jump(start)?;
+        // Subprograms may follow the percent sign at the end of the program.
+        let mut is_after_end = false;
         loop {
+            let before = self.source.place();
             let read = self.source.read_raw(&mut line.raw);
+            if read.is_err() && is_after_end {
+                break;
+            }
             if read.is_err() {
                 self.state.line = self.source.line();
             }
             if !read? {
-                break;
+                if self.source.place() == before {
+                    break;
+                }
+                is_after_end = true;
+                continue;
             }
             let has_o = line.raw.iter().any(|byte| byte.eq_ignore_ascii_case(&b'o'));
             if !has_o

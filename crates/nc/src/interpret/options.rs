@@ -242,7 +242,8 @@ impl TipTransform {
         // The other solution has the opposite angle, and the second rotary axis half a turn away.
         let mut other = found;
         other[first] = -other[first];
-        (first + 1..6).for_each(|axis| other[axis] += std::f64::consts::PI);
+        let second = (first + 1..6).find(|axis| self.joints.contains(&Some(*axis)));
+        second.into_iter().for_each(|axis| other[axis] += std::f64::consts::PI);
         let other = self.oriented(axis, &other)?;
         Ok(if direction * other[first] > 0.0 { other } else { found })
     }

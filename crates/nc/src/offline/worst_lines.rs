@@ -330,7 +330,7 @@ impl LineErrors {
             let orientation = Kinematics::orientation_error(&axis, &actual.axis);
             let before = if self.last_line.0 == place.line { self.last_line.1 } else { 0.0 };
             self.last_line = (place.line, orientation.max(before));
-            self.record(&found, self.passed + nearest);
+            self.record(&found, self.passed + nearest, None);
             self.pass_corners([last_tip.unwrap_or(actual.tip), actual.tip], path_position, &found, nearest);
             found
         })
@@ -374,11 +374,14 @@ impl LineErrors {
             && actual > cycle.contour_error
         {
             (cycle.contour_error, cycle.blending) = (actual, passed.planned);
-            self.record(&cycle, number);
+            // Where the planned path cuts the corner by more than the drives, an axis that reverses in the blend is no cause.
+            let cause = (2.0 * passed.planned > actual).then_some(Cause::Corner);
+            self.record(&cycle, number, cause);
         }
     }
 
-    fn record(&mut self, cycle: &CycleError, number: usize) {
+    /// Adds an error to the figures and worst lines; without a `cause`, that follows from the setpoints about `number`.
+    fn record(&mut self, cycle: &CycleError, number: usize, cause: Option<Cause>) {
         let CycleError { line, time, .. } = *cycle;
         let kind = usize::from(cycle.is_rapid);
         self.sums[kind].add(cycle);
@@ -397,11 +400,12 @@ impl LineErrors {
         if let Some(index) = known {
             lines.remove(index);
         }
-        let (text, cause) = (String::new(), Cause::Feed);
+        let number = cause.is_none().then_some(number);
+        let (text, cause) = (String::new(), cause.unwrap_or(Cause::Feed));
         let CycleError { blending, drives, .. } = *cycle;
         let entry = WorstLine { line, text, error, blending, drives, orientation, time, cause };
         let place = lines.partition_point(|(worst, _)| worst.error >= error);
-        lines.insert(place, (entry, Some(number)));
+        lines.insert(place, (entry, number));
         lines.truncate(COUNT);
     }
 

@@ -136,7 +136,7 @@ mod tests {
 
     #[test]
     fn tip_transform_agrees_with_the_kinematics() {
-        for name in ["mikron_ucp710", "bc_center", "fork_head"] {
+        for name in ["mikron_ucp710", "bc_center", "ac_center", "vmc_a", "fork_head"] {
             let machine =
                 Parameters::load(name, virtual_axes_builtin::MACHINES).unwrap().machine_config().unwrap();
             agrees_with_the_kinematics(&machine);

@@ -80,6 +80,15 @@ fn subprograms_repeat_and_return_to_lines() {
 }
 
 #[test]
+fn subprograms_may_follow_the_end_of_the_program() {
+    let expected = [[5.0, 0.0, 0.0], [5.0, 2.0, 0.0]];
+    let after = "%\nO1\nM98 P10\nG0 Y2.\nM30\n%\n\n(SUBPROGRAM)\nO10\nG0 X5.\nM99\n";
+    assert_ends(Dialect::Fanuc, after, &expected);
+    let enclosed = "%\nO1\nM98 P10\nG0 Y2.\nM30\n%\n%\nO10\nG0 X5.\nM99\n%\n% REST\n";
+    assert_ends(Dialect::Fanuc, enclosed, &expected);
+}
+
+#[test]
 fn a_modal_macro_follows_each_motion() {
     let text = "O1\nG66 P50 Z-3.\nG0 X1.\nG0 X2.\nG67\nG0 X3.\nM30\nO50\nG1 Z#26 F100.\nG0 Z0\nM99\n";
     let expected = [
@@ -279,6 +288,28 @@ fn pecks_of_haas_become_smaller_down_to_the_least_one() {
 }
 
 #[test]
+fn patterns_of_holes_lie_on_circles_and_in_rows() {
+    let holes = |text: &str| -> Vec<[f64; 2]> {
+        let found = motions(text, options(Dialect::Haas));
+        let found = found.iter().filter(|motion| motion.kind == MotionKind::Line);
+        found.map(|motion| [0, 1].map(|axis| (motion.end[axis] * 1e9).round() / 1e6)).collect()
+    };
+    let with_cycle = |pattern: &str| {
+        holes(&format!("G90 G0 X10. Y20. Z5.\nG99 G81 Z-3. R1. F100. L0\n{pattern}\nG80\nM30\n"))
+    };
+    let circle = [[10.0, 25.0], [5.0, 20.0], [10.0, 15.0], [15.0, 20.0]];
+    assert_eq!(with_cycle("G70 I5. J90. L4"), circle);
+    let clockwise = [circle[0], circle[3], circle[2], circle[1]];
+    assert_eq!(with_cycle("G70 I-5. J90. L4"), clockwise);
+    assert_eq!(with_cycle("G70 X0 Y0 I4. L2"), [[4.0, 0.0], [-4.0, 0.0]]);
+    assert_eq!(with_cycle("G71 I10. K-90. L3"), [[20.0, 20.0], [10.0, 10.0], [0.0, 20.0]]);
+    assert_eq!(with_cycle("G72 I3. J90. L3"), [[10.0, 20.0], [10.0, 23.0], [10.0, 26.0]]);
+    // The pattern in the line of the cycle, and holes after it.
+    let in_one_line = "G90 G0 X10. Y20. Z5.\nG99 G81 Z-3. R1. F100. G70 I5. J90. L4\nX1. Y2.\nG80\nM30\n";
+    assert_eq!(holes(in_one_line), [&circle[..], &[[1.0, 2.0]]].concat());
+}
+
+#[test]
 fn circular_pockets_end_at_their_centers() {
     // I4 with a tool of radius 2: circles of 2 mm; K8 in steps of 2: circles of 2, 4 and 6 mm.
     let circles = |text: &str| -> Vec<f64> {
@@ -319,6 +350,20 @@ fn alarms_and_missing_lines_are_rejected() {
         ("O1\nWHILE[1EQ0]DO2\n", "part.nc:2: WHILE DO2 without END2"),
         ("O1\nEND1\n", "part.nc:2: END1 without DO1"),
         ("O1\nG65 A1.\n", "part.nc:2: G65 requires P, the number of the macro"),
+        ("O1\nG70 I5. L4\n", "part.nc:2: G70 requires a canned cycle"),
+        ("O1\nG81 Z-1. R1. F100. L0\nG71 I5. L4\n", "part.nc:3: G71 requires K, the angle between the holes"),
+        (
+            "O1\nG81 Z-1. R1. F100. L0\nG70 I5. L99999\n",
+            "part.nc:3: G70: 99999 holes; at most 10000 are allowed",
+        ),
+        (
+            "O1\nG47 P0 X1. Y1. (AB)\n",
+            "part.nc:2: G47 is not supported in the dialect haas: engraving of text",
+        ),
+        (
+            "O1\nG107\nG107 A0 Y0 R2.\n",
+            "part.nc:3: G107 is not supported in the dialect haas: cylindrical mapping",
+        ),
         ("O1\nG150 P5 X1.\n", "part.nc:2: G150 is not supported in the dialect haas: pocket milling"),
         ("O1\nG68.2 P2 Q4 X0\n", "part.nc:2: G68.2 P2 Q4 is invalid: Q1 to Q3 are the lines of the plane"),
         (

@@ -76,7 +76,7 @@ fn unknown_builtin_machine() {
     assert_eq!(
         Parameters::builtin_text("mikron", virtual_axes_builtin::MACHINES).map_err(|error| error.to_string()),
         Err("unknown machine mikron; the nearest is mikron_ucp710; built-in machines: mikron_ucp710, \
-             linear_motor_center, vmc, hmc, gantry_router, bc_center, fork_head"
+             linear_motor_center, vmc, hmc, gantry_router, bc_center, ac_center, vmc_a, fork_head"
             .to_owned())
     );
 }

@@ -85,17 +85,20 @@ impl Sinumerik {
         Ok(())
     }
 
-    /// Moves to axis positions: SUPA, G53, G153.
+    /// Moves to axis positions: SUPA, G53, G153. It interrupts TRAORI.
     fn machine_motion(&mut self, words: &mut Words, state: &mut State) -> Outcome<()> {
-        if state.modal.tcp_length.is_some() {
-            return Err("axis positions (SUPA, G53, G153) with TRAORI: program TRAFOOF first".to_owned());
+        let tcp_length = state.modal.tcp_length;
+        if tcp_length.is_some() {
+            state.assume("SUPA, G53 and G153 with TRAORI: axis positions, as after TRAFOOF".to_owned());
+            state.leave_tcp();
         }
+        let tool_length = tcp_length.unwrap_or(state.offsets.tool_length);
         state.moves_in_machine_coordinates = true;
         let mut end = state.position;
         for (axis, word) in words.axes.iter_mut().enumerate() {
             let Some((value, approach)) = word.take() else { continue };
             let value = value * state.unit(axis);
-            let tool = if axis == 2 { state.offsets.tool_length } else { 0.0 };
+            let tool = if axis == 2 { tool_length } else { 0.0 };
             end[axis] = match approach {
                 Approach::Incremental => end[axis] + value,
                 Approach::Modal if state.modal.is_incremental => end[axis] + value,
@@ -103,10 +106,11 @@ impl Sinumerik {
             };
         }
         match self.modes.motion {
-            MotionMode::Rapid => state.push_rapid(end),
-            MotionMode::Line => state.push_feed(crate::motion::MotionKind::Line, end),
-            _ => Err("SUPA, G53 and G153 require G0 or G1".to_owned()),
+            MotionMode::Rapid => state.push_rapid(end)?,
+            MotionMode::Line => state.push_feed(crate::motion::MotionKind::Line, end)?,
+            _ => return Err("SUPA, G53 and G153 require G0 or G1".to_owned()),
         }
+        tcp_length.map_or(Ok(()), |length| state.enter_tcp(length))
     }
 
     /// Returns the end of a motion by axis words or polar coordinates, which then count as used.

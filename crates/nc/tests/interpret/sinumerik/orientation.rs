@@ -179,6 +179,32 @@ fn additive_swivels_chain_and_rotary_axes_are_given_directly() {
 }
 
 #[test]
+fn the_sign_of_a_swivel_belongs_to_the_first_rotary_axis() {
+    // A plane that tilts by −15° about X: the table A turns by +15° with half a turn of C, or by −15° without.
+    let (sine, cosine) = 15_f64.to_radians().sin_cos();
+    for (direction, a, c) in [(1, 15.0, 180.0), (-1, -15.0, 0.0)] {
+        let text = format!("D1\nCYCLE800(1,\"\",0,57,0,0,0,-15,0,0,0,0,0,{direction})\nG0 X0 Y0 Z10\nM30\n");
+        let last = motions(&text, options()).pop().expect("a motion");
+        let angles = [3, 4, 5].map(|axis| last.end[axis].to_degrees());
+        assert!((angles[0] - a).abs() < 1e-9 && (angles[2].abs() - c).abs() < 1e-9, "{angles:?}");
+        assert_eq!(angles[1], 0.0, "a machine without B");
+        assert_pose(&pose(&last, 1.0), [0.0, 10.0 * sine, 10.0 * cosine], Vector3::new(0.0, sine, cosine));
+    }
+}
+
+#[test]
+fn axis_positions_interrupt_traori() {
+    let text = "G0 X0 Y0 Z50 D1\nTRAORI\nG1 X5 Y6 Z20 A10 F900\nG0 SUPA Z150\nG1 X5 Y6 Z20\nM30\n";
+    let motions = motions(text, options());
+    let [.., away, back] = motions.as_slice() else { panic!("{motions:?}") };
+    // The tool of 100 mm is above the position of Z; A keeps its angle.
+    assert_eq!(away.tcp_length, None);
+    assert!((away.end[2] - 0.25).abs() < 1e-12 && (away.end[3].to_degrees() - 10.0).abs() < 1e-9, "{away:?}");
+    let (sine, cosine) = 10_f64.to_radians().sin_cos();
+    assert_pose(&pose(back, 1.0), [5.0, 6.0, 20.0], Vector3::new(0.0, -sine, cosine));
+}
+
+#[test]
 fn orientations_require_a_machine_and_traori() {
     let mut three_axes = options();
     three_axes.kinematics = None;
@@ -189,7 +215,6 @@ fn orientations_require_a_machine_and_traori() {
             .contains("CYCLE800 requires a machine with rotary axes")
     );
     assert!(error("G1 X1 A3=0 B3=0 C3=1 F100\n", options()).contains("require TRAORI"));
-    assert!(error("TRAORI\nG0 SUPA Z0\n", options()).contains("program TRAFOOF first"));
     assert!(error("CYCLE800(0,\"\",0,128,0,0,0,30,0,0)\n", options()).contains("projection angles"));
 }
 
