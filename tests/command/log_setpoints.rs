@@ -44,7 +44,7 @@ fn a_log_of_commands_runs_with_the_bits_of_the_same_setpoints_as_csv() {
     for kind in ["mcap", "yaml", "csv"] {
         let out = folder.path(&format!("out.{kind}"));
         let psec = ["psec", &log, "--set", "periods.position_ms=1", "--out", &out];
-        printed(&[&psec[..], &COLUMNS].concat());
+        printed(&[&psec[..], &COLUMNS[..]].concat());
         assert!(of_csv == trace(&folder, &[&out]), "{kind}: other bits");
     }
 }
