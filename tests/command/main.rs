@@ -16,6 +16,7 @@ mod identify_traces;
 mod interface;
 mod learn_command;
 mod limit_audit;
+mod log_setpoints;
 mod output_form;
 mod own_machines;
 mod part_programs;

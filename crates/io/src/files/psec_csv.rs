@@ -9,6 +9,7 @@ use super::error::FileError;
 use super::lines::{Lines, fields};
 use super::psec_error::{MAX_TIME, TIME, header_unit_hint, separator_hint, unit_hint};
 use super::psec_row::{PsecRow, TimeGap, TimeSteps};
+use super::recording::RecordedPsec;
 use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 use virtual_axes_core::trajectory::spline::{KinematicState, Segment, SplineDegree};
 use virtual_axes_core::trajectory::{JointLimits, Rejection};
@@ -57,6 +58,8 @@ pub struct PsecCsvReader<R> {
     is_done: bool,
     /// Rows read since the last [`take_rows`](Self::take_rows), if they are kept.
     rows: Option<Vec<PsecRow>>,
+    /// Values of the last digits of the columns of a recording, m or rad; its errors name samples in place of lines.
+    recorded: Option<Vec<f64>>,
 }
 
 impl PsecCsvReader<File> {
@@ -71,6 +74,22 @@ impl PsecCsvReader<File> {
     }
 }
 
+impl PsecCsvReader<RecordedPsec> {
+    /// Reads the setpoints of a recording; see [`PsecCsvReader::new`].
+    ///
+    /// # Errors
+    /// Returns a [`FileError`] if the first sample is invalid.
+    pub fn recorded(
+        recorded: RecordedPsec,
+        name: &str,
+        period: Nanoseconds,
+        joints: &[JointLimits],
+    ) -> Result<Self, FileError> {
+        let resolutions = recorded.resolutions().to_vec();
+        Self::with_recorded(recorded, (name, Some(resolutions)), period, joints)
+    }
+}
+
 impl<R: Read> PsecCsvReader<R> {
     /// Reads the header and the first row. `name` is the file name in errors, `period` is Tsp in ns and positive,
     /// `joints` are all joints of the machine.
@@ -78,6 +97,15 @@ impl<R: Read> PsecCsvReader<R> {
     /// # Errors
     /// Returns a [`FileError`] if the header or the first row is invalid.
     pub fn new(input: R, name: &str, period: Nanoseconds, joints: &[JointLimits]) -> Result<Self, FileError> {
+        Self::with_recorded(input, (name, None), period, joints)
+    }
+
+    fn with_recorded(
+        input: R,
+        (name, recorded): (&str, Option<Vec<f64>>),
+        period: Nanoseconds,
+        joints: &[JointLimits],
+    ) -> Result<Self, FileError> {
         debug_assert!(period > 0, "the period is positive");
         let mut psec = PsecCsvReader {
             lines: Lines::new(input),
@@ -95,6 +123,7 @@ impl<R: Read> PsecCsvReader<R> {
             is_last_row: false,
             is_done: false,
             rows: None,
+            recorded,
         };
         psec.read_header(joints)?;
         if !psec.read_point()? {
@@ -247,7 +276,7 @@ impl<R: Read> PsecCsvReader<R> {
     }
 
     fn at(&self, line: u64) -> String {
-        format!("{}:{line}", self.name)
+        place(&self.name, line, self.recorded.is_some())
     }
 
     fn read_header(&mut self, joints: &[JointLimits]) -> Result<(), FileError> {
@@ -293,11 +322,11 @@ impl<R: Read> PsecCsvReader<R> {
 
     /// Reads and checks the next row into `after`; returns false at the end of the file.
     fn read_point(&mut self) -> Result<bool, FileError> {
-        let PsecCsvReader { lines, name, columns, limits, before, after, rows, .. } = self;
+        let PsecCsvReader { lines, name, columns, limits, before, after, rows, recorded, .. } = self;
         let found =
             lines.next().map_err(|(line, reason)| FileError::new(format_args!("{name}:{line}"), reason))?;
         let Some((line, text)) = found else { return Ok(false) };
-        let at = || format!("{name}:{line}");
+        let at = || place(name, line, recorded.is_some());
         let wanted = columns.len() + 1;
         let mut values = fields(text).map(parse_number);
         let time = values.next().unwrap_or(f64::NAN);
@@ -343,10 +372,19 @@ impl<R: Read> PsecCsvReader<R> {
                 .map_err(|rejection| point_error(at(), &rejection))?;
         }
         if let Some(rows) = rows {
-            rows.push(PsecRow::new(line, after.time, &after.positions).with_digits_of(text));
+            let row = |line| PsecRow::new(line, after.time, &after.positions);
+            rows.push(match recorded {
+                Some(resolutions) => row(line.saturating_sub(1)).with_resolutions(resolutions),
+                None => row(line).with_digits_of(text),
+            });
         }
         Ok(true)
     }
+}
+
+/// Returns the line, or the sample of a recording, below the header, for errors.
+fn place(name: &str, line: u64, is_recorded: bool) -> String {
+    if is_recorded { format!("{name}: sample {}", line.saturating_sub(1)) } else { format!("{name}:{line}") }
 }
 
 /// Returns the error of a setpoint that the joint does not permit.

@@ -26,6 +26,12 @@ impl PsecRow {
         Self { line, time, positions, time_resolution: f64::INFINITY, resolutions }
     }
 
+    /// Sets the values of the last digits; the time has all digits.
+    pub(super) fn with_resolutions(mut self, resolutions: &[f64]) -> Self {
+        (self.time_resolution, self.resolutions) = (1e-9, resolutions.to_vec());
+        self
+    }
+
     /// Sets the values of the last digits of `text`, the line of the row.
     pub(super) fn with_digits_of(mut self, text: &str) -> Self {
         let mut digits = fields(text).map(resolution);

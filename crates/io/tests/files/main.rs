@@ -4,6 +4,7 @@ mod bounded_recording;
 mod psec_csv;
 mod psec_mcap;
 mod psec_yaml;
+mod recorded_psec;
 mod recording_any_bytes;
 mod recording_columns;
 mod recording_csv;

@@ -4,7 +4,7 @@ use super::recording_columns::{Recorded, summary};
 use virtual_axes_io::files::RecordingFormat;
 
 /// Rotary axis 7 that brakes.
-const MOTION: &str = include_str!("../data/sinumerik_trace_motion.xml");
+pub(crate) const MOTION: &str = include_str!("../data/sinumerik_trace_motion.xml");
 /// Axis at rest: values without a change are left out.
 const REST: &str = include_str!("../data/sinumerik_trace_rest.xml");
 

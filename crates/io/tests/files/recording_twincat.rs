@@ -18,7 +18,7 @@ fn millimeters(values: &[f64]) -> Option<Vec<f64>> {
 }
 
 /// Returns the export with shared times of two axes: the names of the channels are those of numerical controls.
-fn axes() -> String {
+pub(crate) fn axes() -> String {
     let names = "Name\tAxis 1 SetPos\tAxis 1 ActPos\tName\tAxis 1 ActTorque\tName\tActPos\tActVelo";
     let text = SHARED_TIMES
         .replace("Name\tvar_REAL32\tvar_REAL64\tName\tfunc_OS\tName\tfunc_scaled\tfunc_units_scaled", names);

@@ -6,6 +6,7 @@ use std::path::Path;
 use clap::builder::NonEmptyStringValueParser;
 use virtual_axes_core::config::{DEFAULT_MACHINE, Parameters};
 
+use crate::arguments::log_arguments::LogArguments;
 use crate::arguments::variant;
 use crate::input::part_program::PartProgramArguments;
 use crate::input::{CommandInput, must_not_replace};
@@ -44,7 +45,8 @@ impl MachineArguments {
 #[derive(Debug, clap::Args)]
 pub struct TrialArguments {
     /// Built-in scenario or part program, scenario file, part program file (`.nc`, `.ngc`, …), or file with setpoints:
-    /// CSV (`time,x,y,…` in s, m, rad), MCAP with a JointTrajectory, or YAML for `ros2 topic pub`.
+    /// CSV (`time,x,y,…` in s, m, rad), MCAP with a JointTrajectory, YAML for `ros2 topic pub`, or a log of a control
+    /// (halsampler, Sinumerik Edge or trace, TwinCAT Scope).
     #[arg(value_name = "SCENARIO|FILE", value_parser = NonEmptyStringValueParser::new())]
     input: String,
     /// Built-in machine or machine file.
@@ -58,6 +60,8 @@ pub struct TrialArguments {
     pub feed: Option<f64>,
     #[command(flatten)]
     part_program: PartProgramArguments,
+    #[command(flatten)]
+    log: LogArguments,
     /// Topic to run, if a recording has several topics with a JointTrajectory.
     #[arg(long)]
     topic: Option<String>,
@@ -77,7 +81,8 @@ impl TrialArguments {
 
     /// Opens the scenario, the part program or the file with setpoints.
     pub fn input(&self) -> Result<CommandInput, Box<dyn Error>> {
-        CommandInput::open(&self.input, self.topic.as_deref())?.with_part_program(&self.part_program)
+        CommandInput::open(&self.input, self.topic.as_deref(), &self.log)?
+            .with_part_program(&self.part_program)
     }
 }
 

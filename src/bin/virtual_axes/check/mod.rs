@@ -21,6 +21,7 @@ use virtual_axes_core::trial::{self, Measures, SetpointSource, Tick, Trial};
 use virtual_axes_core::units::Nanoseconds;
 use virtual_axes_io::files::FileKind;
 
+use crate::arguments::log_arguments::LogArguments;
 use crate::builtin::{PROGRAMS, SCENARIOS};
 use crate::input::part_program::{self, PartProgramArguments};
 use crate::input::setpoint_summary::SetpointSummary;
@@ -34,7 +35,7 @@ use virtual_axes_report::runs::axis_warnings;
 /// Arguments of `virtual_axes check`.
 #[derive(Debug, clap::Args)]
 pub struct CheckArguments {
-    /// Machine file (ROS 2 parameter file), scenario file, setpoints (CSV, MCAP, YAML), part program (.nc, .ngc,
+    /// Machine file (ROS 2 parameter file), scenario file, setpoints (CSV, MCAP, YAML, logs of controls), part program (.nc, .ngc,
     /// .tap, .cnc, .mpf, .gcode, .iso, .eia), or name of a built-in machine or scenario.
     #[arg(value_name = "MACHINE|SCENARIO|FILE")]
     file: PathBuf,
@@ -43,6 +44,8 @@ pub struct CheckArguments {
     machine: String,
     #[command(flatten)]
     part_program: PartProgramArguments,
+    #[command(flatten)]
+    log: LogArguments,
     /// Print the limit audit of setpoints or of a part program as one JSON object.
     #[arg(long)]
     json: bool,
@@ -51,11 +54,13 @@ pub struct CheckArguments {
 /// Validates the file and returns its kind and contents.
 pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
     let name = arguments.file.to_string_lossy();
-    if part_program::is_part_program(&name) {
+    let is_log = arguments.log.applies_to(&name);
+    if !is_log && part_program::is_part_program(&name) {
         let config = Parameters::load(&arguments.machine, crate::builtin::MACHINES)?.machine_config()?;
         return part_program(arguments, &name, &config);
     }
     let is_machine = match arguments.file.exists() {
+        true if is_log => false,
         true => part_program::open_other(&arguments.file)?.kind() == FileKind::Machine,
         false => is_shipped_machine(&name)?,
     };
@@ -66,6 +71,9 @@ pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
         }
         if let Some(option) = arguments.part_program.given() {
             return Err(format!("{name}: {option} requires a part program").into());
+        }
+        if let Some(option) = arguments.log.given() {
+            return Err(format!("{name}: {option} requires a log of a control, or setpoints as CSV").into());
         }
         if arguments.json {
             return Err(no_audit().into());
@@ -87,7 +95,9 @@ pub fn run(arguments: &CheckArguments) -> Result<String, Box<dyn Error>> {
     }
     let parameters = Parameters::load(&arguments.machine, crate::builtin::MACHINES)?;
     let config = parameters.machine_config()?;
-    let input = CommandInput::open(&name, None)?.with_part_program(&arguments.part_program)?.with_kept_rows();
+    let input = CommandInput::open(&name, None, &arguments.log)?
+        .with_part_program(&arguments.part_program)?
+        .with_kept_rows();
     match input.program(&config, None)? {
         Some(_) if arguments.json => Err(no_audit().into()),
         Some(program) => scenario(&input, &config, &program),
@@ -185,7 +195,7 @@ fn part_program(
 ) -> Result<String, Box<dyn Error>> {
     let lines = part_program::count_lines(name).map_err(|error| format!("{name}: {error}"))?;
     let mut progress = TrialProgress::with_lines(name, lines, arguments.json);
-    let input = CommandInput::open(name, None)?.with_part_program(&arguments.part_program)?;
+    let input = CommandInput::open(name, None, &arguments.log)?.with_part_program(&arguments.part_program)?;
     let survey = input.survey(machine, &mut |line| progress.set_line(line))?;
     let mut summary = program_check::summary(&survey, machine);
     let SetpointSource::Grid(mut source) = input.setpoints(machine, None)? else {

@@ -11,6 +11,7 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::arguments::log_arguments::LogArguments;
 use crate::builtin::{PROGRAM_DESCRIPTIONS, PROGRAMS, SCENARIOS};
 use crate::output::progress::TrialProgress;
 use crate::output::{interrupt, print_error};
@@ -36,7 +37,7 @@ pub struct CommandInput {
     /// Gap in the rows of a CSV file that was read.
     gap: Cell<Option<TimeGap>>,
     options: PartProgramOptions,
-    /// True after the survey of a part program.
+    /// True after the survey of a part program, or the first reading of a log.
     is_surveyed: Cell<bool>,
     track: RefCell<ProgramTrack>,
     /// Rows of a CSV file that were read and not taken; `None` if they are not kept.
@@ -53,21 +54,26 @@ enum Content {
     Mcap {
         topic: Option<String>,
     },
+    /// Recording of a control.
+    Log(LogArguments),
 }
 
 impl CommandInput {
-    /// Opens the built-in scenario `name`, or the file `name`. `topic` selects the topic of an MCAP recording.
+    /// Opens the built-in scenario `name`, or the file `name`. `topic` selects the topic of an MCAP
+    /// recording, and `log` the columns of a log of a control.
     ///
     /// # Errors
     ///
     /// Returns an error if the file cannot be read or is invalid, or if `topic` is given for another kind of
     /// file.
-    pub fn open(name: &str, topic: Option<&str>) -> Result<Self, Box<dyn Error>> {
+    pub fn open(name: &str, topic: Option<&str>, log: &LogArguments) -> Result<Self, Box<dyn Error>> {
         let is_scenario = builtin_text(SCENARIOS, name).is_some();
         let is_program = builtin_text(PROGRAMS, name).is_some();
         let content = if is_scenario || (!is_program && !Path::new(name).exists()) {
             // The error of an unknown name lists the built-in scenarios.
             Content::Scenario(Box::new(Scenario::load(name, SCENARIOS).map_err(with_programs)?))
+        } else if !is_program && log.applies_to(name) {
+            Content::Log(log.clone())
         } else if is_part_program(name) {
             Content::PartProgram
         } else {
@@ -75,6 +81,9 @@ impl CommandInput {
         };
         if topic.is_some() && !matches!(content, Content::Mcap { .. }) {
             return Err(format!("{name}: --topic requires an MCAP recording").into());
+        }
+        if let (Some(option), false) = (log.given(), matches!(content, Content::Log(_))) {
+            return Err(format!("{name}: {option} requires a log of a control, or setpoints as CSV").into());
         }
         Ok(CommandInput {
             name: name.to_owned(),
@@ -113,7 +122,7 @@ impl CommandInput {
     /// Keeps the rows of a CSV file for [`take_rows`](Self::take_rows).
     #[must_use]
     pub fn with_kept_rows(mut self) -> Self {
-        self.rows = matches!(self.content, Content::Csv(_)).then(RefCell::default);
+        self.rows = matches!(self.content, Content::Csv(_) | Content::Log(_)).then(RefCell::default);
         self
     }
 
@@ -236,12 +245,12 @@ impl CommandInput {
                     None => files::Input::open(Path::new(&self.name))?,
                 };
                 let psec = PsecCsvReader::new(file.into_reader(), &self.name, period, &limits)?;
-                let psec = psec.with_start_at_first_row();
-                Ok(SetpointSource::Grid(Box::new(CsvSource {
-                    psec: if self.rows.is_some() { psec.with_kept_rows() } else { psec },
-                    gap: &self.gap,
-                    rows: self.rows.as_ref(),
-                })))
+                Ok(self.rows_of(psec))
+            }
+            Content::Log(log) => {
+                let recorded = log.open(&self.name, machine, !self.is_surveyed.replace(true))?;
+                let psec = PsecCsvReader::recorded(recorded, &self.name, period, &limits)?;
+                Ok(self.rows_of(psec))
             }
             Content::Yaml(requests) => Ok(SetpointSource::Requests(Box::new(
                 requests.iter().map(|request| Ok((0, request.clone()))),
@@ -253,6 +262,16 @@ impl CommandInput {
                 )))
             }
         }
+    }
+
+    /// Returns the setpoints of rows, which start at rest in the first one.
+    fn rows_of<'a>(&'a self, psec: PsecCsvReader<impl Read + 'a>) -> SetpointSource<'a> {
+        let psec = psec.with_start_at_first_row();
+        SetpointSource::Grid(Box::new(CsvSource {
+            psec: if self.rows.is_some() { psec.with_kept_rows() } else { psec },
+            gap: &self.gap,
+            rows: self.rows.as_ref(),
+        }))
     }
 
     /// Interprets a part program as a whole, without planning. `on_line` receives the lines that were read.

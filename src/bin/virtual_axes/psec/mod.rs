@@ -12,6 +12,7 @@ use virtual_axes_core::trial::SetpointSource;
 use virtual_axes_core::units::seconds;
 use virtual_axes_io::files::psec_writer;
 
+use crate::arguments::log_arguments::LogArguments;
 use crate::arguments::variant;
 use crate::input::part_program::PartProgramArguments;
 use crate::input::{CommandInput, must_not_replace};
@@ -28,6 +29,8 @@ pub struct PsecArguments {
     // Not in the optional group of the scenario: clap does not see the words of such a group if it contains another.
     #[command(flatten)]
     part_program: PartProgramArguments,
+    #[command(flatten)]
+    log: LogArguments,
 }
 
 /// Source of the setpoints other than a scenario.
@@ -40,7 +43,8 @@ enum PsecKind {
 /// Arguments of `virtual_axes psec` for a scenario.
 #[derive(Debug, clap::Args)]
 struct ScenarioPsecArguments {
-    /// Built-in scenario or part program, scenario file, or part program file (`.nc`, `.ngc`, …).
+    /// Built-in scenario or part program, scenario file, part program file (`.nc`, `.ngc`, …), setpoints as CSV, or a log
+    /// of a control (halsampler, Sinumerik Edge or trace, TwinCAT Scope).
     scenario: String,
     /// Output file: CSV (`time,x,y,…` in s, m, rad), MCAP with a JointTrajectory on `/psec`, or YAML for
     /// `ros2 topic pub`, by the extension .csv, .mcap or .yaml.
@@ -61,7 +65,7 @@ struct ScenarioPsecArguments {
 pub fn run(arguments: &PsecArguments) -> Result<String, Box<dyn Error>> {
     match (&arguments.kind, &arguments.scenario) {
         (Some(PsecKind::Campaign(arguments)), _) => campaign::run(arguments),
-        (None, Some(scenario)) => write_scenario(scenario, &arguments.part_program),
+        (None, Some(scenario)) => write_scenario(scenario, &arguments.part_program, &arguments.log),
         (None, None) => Err("psec requires a scenario or the subcommand `campaign`".into()),
     }
 }
@@ -70,10 +74,11 @@ pub fn run(arguments: &PsecArguments) -> Result<String, Box<dyn Error>> {
 fn write_scenario(
     arguments: &ScenarioPsecArguments,
     part_program: &PartProgramArguments,
+    log: &LogArguments,
 ) -> Result<String, Box<dyn Error>> {
     let machine = Parameters::load(&arguments.machine, crate::builtin::MACHINES)?;
     let config = variant::parameters(&machine, None, &arguments.set, &[])?.machine_config()?;
-    let input = CommandInput::open(&arguments.scenario, None)?.with_part_program(part_program)?;
+    let input = CommandInput::open(&arguments.scenario, None, log)?.with_part_program(part_program)?;
     input.must_not_be(&arguments.out)?;
     must_not_replace(&arguments.out, Path::new(&arguments.machine))?;
     let program = input.program(&config, arguments.feed)?;

@@ -15,6 +15,7 @@ use virtual_axes_identify::tune::{
 use virtual_axes_io::files::tuning_json;
 use virtual_axes_report::runs::SimulatedRun;
 
+use crate::arguments::log_arguments::LogArguments;
 use crate::arguments::output_arguments::{OutputArguments, OutputFormat};
 use crate::arguments::trial_arguments::TrialArguments;
 use crate::arguments::variant;
@@ -131,8 +132,11 @@ pub fn run(arguments: &TuneArguments) -> Result<String, Box<dyn Error>> {
     let path = read_workload(&input, &config, arguments.trial.feed)?;
     let program = input.program(&config, arguments.trial.feed)?;
     let warning = program.and_then(|program| program_text::unreached_feed(&program, config.axes()));
-    let others =
-        arguments.also.iter().map(|name| CommandInput::open(name, None)).collect::<Result<Vec<_>, _>>()?;
+    let others = arguments
+        .also
+        .iter()
+        .map(|name| CommandInput::open(name, None, &LogArguments::default()))
+        .collect::<Result<Vec<_>, _>>()?;
     let paths =
         others.iter().map(|other| read_workload(other, &config, None)).collect::<Result<Vec<_>, _>>()?;
     let limits = limits(arguments);

@@ -107,7 +107,7 @@ impl Context<'_> {
         let is_trace =
             Channel::ALL.iter().any(|c| *c != Channel::Time && columns.contains(&self.trace_header(*c)));
         let mut direct = [None; Channel::ALL.len()];
-        for (place, channel) in direct.iter_mut().zip(Channel::ALL) {
+        for (place, channel) in direct.iter_mut().zip(Channel::ALL).filter(|(_, c)| self.is_read(*c)) {
             *place = self.find(channel, &self.candidate_headers(channel, is_trace), columns, at)?;
         }
         // A mapping may use the column of the motor's position for another channel.
@@ -124,7 +124,8 @@ impl Context<'_> {
         }
         let found = if is_trace { &[] } else { found };
         let selector = Selector::new(self, found, direct.into_iter().flatten().collect(), at);
-        for ((index, channel), direct) in Channel::ALL.into_iter().enumerate().zip(direct) {
+        let places = Channel::ALL.into_iter().enumerate().zip(direct);
+        for ((index, channel), direct) in places.filter(|((_, channel), _)| self.is_read(*channel)) {
             let factor = factors.get(index).copied().unwrap_or(1.0);
             let choice = match direct {
                 Some(column) => Some((column, factor)),

@@ -240,7 +240,7 @@ fn delimiter(text: &str) -> Option<char> {
     (!of_numbers).then_some(found)
 }
 
-fn column_and_unit(text: &str) -> Result<(Column, Option<Unit>), String> {
+pub(super) fn column_and_unit(text: &str) -> Result<(Column, Option<Unit>), String> {
     let (column, unit) = match text.strip_suffix(']').and_then(|text| text.rsplit_once('[')) {
         Some((column, unit)) => (column.trim(), Some(Unit::parse(unit)?)),
         None => (text, None),

@@ -18,6 +18,8 @@ pub(super) struct Context<'a> {
     pub columns: &'a Columns,
     /// Sampling rate, Hz, of a file without a column of time.
     pub rate: Option<f64>,
+    /// True to read time and position only.
+    pub is_setpoint: bool,
 }
 
 impl Context<'_> {
@@ -44,6 +46,11 @@ impl Context<'_> {
             *factor = unit.factor * worth;
         }
         Ok(factors)
+    }
+
+    /// Returns true if the channel is read.
+    pub fn is_read(&self, channel: Channel) -> bool {
+        !self.is_setpoint || matches!(channel, Channel::Time | Channel::Position)
     }
 
     /// Returns true if the recording must have a column of the channel.
@@ -110,6 +117,7 @@ impl RecordingOptions {
             is_joint_given: self.joint.is_some(),
             columns: &self.columns,
             rate: self.rate_hz,
+            is_setpoint: false,
         })
     }
 }

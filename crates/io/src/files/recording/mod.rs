@@ -14,6 +14,7 @@ mod join;
 mod layout;
 mod line_counter;
 mod mcap;
+mod recorded_psec;
 mod recording_builder;
 mod recording_columns;
 mod series;
@@ -34,11 +35,13 @@ pub use columns::Columns;
 pub use context::RecordingOptions;
 pub use format::RecordingFormat;
 pub use found_column::{ColumnUnit, FoundColumn};
+pub use recorded_psec::RecordedPsec;
 pub use recording_columns::RecordingColumns;
 pub use unit::Channel;
 
 use super::error::{ErrorKind, FileError};
 use super::input::{FileKind, Input};
+use context::Context;
 use format::Found;
 use virtual_axes_core::config::AxisConfig;
 use virtual_axes_identify::recording::{Finding, RawRecording};
@@ -97,7 +100,7 @@ pub fn read_recording(
     let (format, head) = read_head(&mut file, &name, options)?;
     let (recording, mut findings) = match format {
         RecordingFormat::Mcap => read_recording_mcap(file, &name, axis, options)?,
-        _ => read_stream((format, head), file, &name, axis, options).map_err(|error| {
+        _ => read_stream((format, head), file, &options.context(&name, axis)?).map_err(|error| {
             match detect_other_kind(path, &error).filter(|_| format == RecordingFormat::Csv) {
                 Some(kind) => FileError::new(
                     &name,
@@ -147,18 +150,16 @@ pub fn read_recording_stream(
     options: &RecordingOptions,
 ) -> Result<(RawRecording, Vec<Finding>), FileError> {
     let head = read_head(&mut input, name, options)?;
-    read_stream(head, input, name, axis, options)
+    read_stream(head, input, &options.context(name, axis)?)
 }
 
 /// Reads the recording from a stream after its first bytes.
 fn read_stream(
     (format, head): (RecordingFormat, Vec<u8>),
     rest: impl Read,
-    name: &str,
-    axis: &AxisConfig,
-    options: &RecordingOptions,
+    context: &Context,
 ) -> Found<Recording> {
-    let (input, context) = (&mut Cursor::new(head).chain(rest), &options.context(name, axis)?);
+    let input = &mut Cursor::new(head).chain(rest);
     match format {
         RecordingFormat::Csv => csv::read(input, context),
         RecordingFormat::SinumerikTrace => sinumerik_trace::read(input, context),
@@ -166,7 +167,7 @@ fn read_stream(
         RecordingFormat::TwinCatScope => twincat::read(input, context),
         RecordingFormat::Halsampler => halsampler::read(input, context),
         RecordingFormat::Mcap => {
-            Err(FileError::content(name, format, "MCAP is read from a file, not from a stream"))
+            Err(FileError::content(context.name, format, "MCAP is read from a file, not from a stream"))
         }
     }
 }
