@@ -25,6 +25,11 @@ impl Machine {
         self.records_every_tick = every_tick;
     }
 
+    /// Returns true if the controller outputs of every tick are recorded.
+    pub fn records_every_tick(&self) -> bool {
+        self.records_every_tick
+    }
+
     /// Returns the energy balance of the motor of an axis.
     ///
     /// # Panics
