@@ -203,7 +203,14 @@ impl OperationMeter {
     }
 
     /// Returns times and energy; `comments` are those of the program, and the texts of lines stay empty.
-    pub fn finish(self, comments: &[(usize, String)]) -> OperationSummary {
+    pub fn finish(mut self, comments: &[(usize, String)]) -> OperationSummary {
+        // The first setpoint, before any step of the program, has no time.
+        if let [(_, first), (_, second), ..] = &mut self.operations[..]
+            && first.cycles == [0; 4]
+        {
+            second.add(first);
+            self.operations.remove(0);
+        }
         let energy = |sums: &Sums| self.has_energy.then_some(sums.energy);
         let (mut total, mut tools) = (Sums::default(), Vec::<(Option<u32>, Sums)>::new());
         let mut operations = Vec::new();
