@@ -5,7 +5,8 @@
 use serde_json::{Map, Value, json};
 use virtual_axes_core::config::AxisUnits;
 use virtual_axes_core::trial::{
-    AxisEnergy, AxisFigures, BidirectionalFigures, CircleFigures, CornerFigures, Figures, Reference,
+    AxisEnergy, AxisFigures, BidirectionalFigures, CircleFigures, CornerFigures, DcLinkEnergy, Figures,
+    Reference,
 };
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MICROMETER, MILLIDEGREE, MILLIMETER};
 use virtual_axes_nc::offline::{
@@ -19,7 +20,7 @@ pub fn figures_json(figures: &Figures) -> Map<String, Value> {
     object.insert("duration_s".to_owned(), json!(figures.duration));
     let axes = figures.axes.iter().map(|axis| (axis.name.clone(), self::axis(axis)));
     object.insert("axes".to_owned(), Value::Object(axes.collect()));
-    object.insert("dc_link".to_owned(), dc_link(figures));
+    object.extend(figures.dc_link.map(|link| ("dc_link".to_owned(), dc_link(&link))));
     object.insert("contour_error_um".to_owned(), contour(figures));
     object.insert("orientation_error_mdeg".to_owned(), orientation(figures));
     object.insert("circles".to_owned(), figures.circles.iter().map(circle).collect());
@@ -30,11 +31,8 @@ pub fn figures_json(figures: &Figures) -> Map<String, Value> {
     object
 }
 
-fn dc_link(figures: &Figures) -> Value {
-    figures.dc_link.map_or(
-        Value::Null,
-        |link| json!({ "drawn_j": link.drawn, "returned_j": link.returned, "peak_power_w": link.peak_power }),
-    )
+fn dc_link(link: &DcLinkEnergy) -> Value {
+    json!({ "drawn_j": link.drawn, "returned_j": link.returned, "peak_power_w": link.peak_power })
 }
 
 fn axis_energy(energy: &AxisEnergy) -> Value {
@@ -121,7 +119,7 @@ pub fn part_program_json(figures: &ProgramFigures) -> Value {
 fn axis(axis: &AxisFigures) -> Value {
     let AxisUnits { error: scale, error_key: unit, .. } = AxisUnits::for_kind(axis.kind);
     let report = &axis.report;
-    json!({
+    let mut object = json!({
         "unit": unit,
         "moves": axis.moves,
         "following_error": {
@@ -137,8 +135,11 @@ fn axis(axis: &AxisFigures) -> Value {
         "control_activity_a": report.control_activity,
         "outside_travel_limits_s": axis.outside_travel_limits_time,
         "friction_extrapolated": axis.friction_extrapolated,
-        "energy": axis.energy.as_ref().map(axis_energy),
-    })
+    });
+    if let Some(energy) = &axis.energy {
+        object["energy"] = axis_energy(energy);
+    }
+    object
 }
 
 fn contour(figures: &Figures) -> Value {
