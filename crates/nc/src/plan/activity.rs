@@ -10,7 +10,7 @@ pub enum TimeKind {
     Rapid,
     /// Dwell (G4, cycles).
     Dwell,
-    /// Standstill for a tool change or a change of the spindle speed.
+    /// ProgramStop for a tool change or a change of the spindle speed.
     Auxiliary,
 }
 
@@ -27,7 +27,7 @@ pub struct ProgramActivity {
 
 /// Standstill between two motions.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Standstill {
+pub(super) struct ProgramStop {
     /// Duration, s.
     pub time: f64,
     pub activity: ProgramActivity,

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::activity::{ProgramActivity, Standstill};
+use super::activity::{ProgramActivity, ProgramStop};
 use super::error::FeedPlanError;
 use super::interval_motion::{IntervalMotion, Law, motions, straight_line};
 use super::machine_model::{MachineModel, Surroundings};
@@ -177,8 +177,8 @@ impl<'a> LookAhead<'a> {
                     self.is_finished = true;
                     return Ok(());
                 }
-                Some(Part::Stop(Standstill { time: 0.0, .. })) => {}
-                Some(Part::Stop(Standstill { time, activity })) => {
+                Some(Part::Stop(ProgramStop { time: 0.0, .. })) => {}
+                Some(Part::Stop(ProgramStop { time, activity })) => {
                     let piece = self.last_piece.clone();
                     self.push_motions(piece.as_ref(), vec![IntervalMotion::dwell(time)]);
                     if let Some(entry) = self.entries.back_mut() {

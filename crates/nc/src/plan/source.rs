@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use virtual_axes_core::trajectory::JointLimits;
 
-use super::activity::{ProgramActivity, Standstill, TimeKind};
+use super::activity::{ProgramActivity, ProgramStop, TimeKind};
 use super::blended_path::ARC_DEVIATION;
 use super::error::{FeedPlanError, StepError};
 use super::motion_curve::{Arc, BlendTolerance, CurveEnd, FeedCap, FeedJoints, MotionCurve, Shape};
@@ -24,7 +24,7 @@ const MIN_TOLERANCE: f64 = 1e-8;
 #[derive(Debug, Clone)]
 pub(super) enum Part<T> {
     Path(T),
-    Stop(Standstill),
+    Stop(ProgramStop),
 }
 
 /// Axes of the machine and their programmed letters.
@@ -137,7 +137,7 @@ impl<'a> PartSource<'a> {
 
     fn push_stop(&mut self, time: f64, kind: TimeKind, line: usize) {
         let activity = ProgramActivity { kind, line, tool: self.tool };
-        self.pending.push_back(Part::Stop(Standstill { time, activity }));
+        self.pending.push_back(Part::Stop(ProgramStop { time, activity }));
     }
 
     fn add(&mut self, motion: &ProgramMotion) -> Result<(), FeedPlanError> {
