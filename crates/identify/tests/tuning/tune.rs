@@ -437,25 +437,21 @@ fn the_cost_of_a_tuning_is_the_error_of_the_cuts() {
         Workload::read("test", None, source, || Ok(())).expect("setpoints")
     };
     let cost = Cost::default();
-    let tune = |workload: &Workload| {
-        let problem =
-            TuningProblem::new(&parameters, workload, &cost, &NoProgress).expect("a tuning problem");
-        let found = tune_gpc(&problem, &MarginLimits::default()).expect("a tuning").best;
-        let contour = [problem.present(), &found].map(|one| one.figures.contour.expect("a contour error"));
-        ([problem.present().cost, found.cost], contour)
-    };
-    let (costs, contour) = tune(&workload(&rapid));
-    for (cost, contour) in costs.iter().zip(contour) {
-        let rapids = contour.rapids.expect("rapid traverse");
-        assert_eq!(*cost, contour.max / MICROMETER);
+    let cuts = workload(&rapid);
+    let problem = TuningProblem::new(&parameters, &cuts, &cost, &NoProgress).expect("a tuning problem");
+    let found = tune_gpc(&problem, &MarginLimits::default()).expect("a tuning").best;
+    let contour = |one: &TuningCandidate| one.figures.contour.expect("a contour error");
+    for one in [problem.present(), &found] {
+        let rapids = contour(one).rapids.expect("rapid traverse");
+        assert_eq!(one.cost, contour(one).max / MICROMETER);
         // The larger error of the rapids is not in the cost.
-        assert!(rapids.max > contour.max, "{contour:?}");
+        assert!(rapids.max > contour(one).max, "{:?}", contour(one));
     }
-    assert!(costs[1] < costs[0], "{costs:?}");
-    // The same setpoints, all at feed: their cost is the error that was one of the rapids.
+    assert!(found.cost < problem.present().cost, "{} of {}", found.cost, problem.present().cost);
+    // The same setpoints, all at feed: the cost is the error that was one of the rapids.
     let all = workload(&vec![false; rapid.len()]);
-    let ([present, tuned], [before, after]) = tune(&all);
-    assert!(before.rapids.is_none() && after.rapids.is_none());
-    assert_eq!(present, contour[0].rapids.expect("rapid traverse").max / MICROMETER);
-    assert!(tuned < present, "{tuned} of {present}");
+    let at_feed = TuningProblem::new(&parameters, &all, &cost, &NoProgress).expect("a tuning problem");
+    let rapids = contour(problem.present()).rapids.expect("rapid traverse");
+    assert!(contour(at_feed.present()).rapids.is_none());
+    assert_eq!(at_feed.present().cost, rapids.max / MICROMETER);
 }

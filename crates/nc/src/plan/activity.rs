@@ -10,7 +10,7 @@ pub enum TimeKind {
     Rapid,
     /// Dwell (G4, cycles).
     Dwell,
-    /// ProgramStop for a tool change or a change of the spindle speed.
+    /// Standstill for a tool change or a change of the spindle speed.
     Auxiliary,
 }
 
