@@ -5,7 +5,7 @@ use std::sync::Arc;
 use virtual_axes_builtin::SCENARIOS;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::scenario::Scenario;
-use virtual_axes_core::trial::{Figures, Measures, Tick, Trial, run as run_trial};
+use virtual_axes_core::trial::{AxisFigures, Figures, Measures, Tick, Trial, run as run_trial};
 use virtual_axes_core::units::{DEGREE, REVOLUTION, RPM};
 use virtual_axes_verification::fixtures::machines::*;
 
@@ -295,10 +295,15 @@ fn a_choice_of_figures_leaves_the_others_as_they_are() {
     };
     let all = figures(Measures::ALL);
     assert!(all.contour.is_some() && !all.circles.is_empty());
+    let without_energy = |figures: Figures| {
+        let axes = figures.axes.into_iter().map(|axis| AxisFigures { energy: None, ..axis }).collect();
+        Figures { axes, dc_link: None, ..figures }
+    };
+    let all = without_energy(all);
     let without_circles = Figures { circles: Vec::new(), bidirectional: Vec::new(), ..all.clone() };
     assert_eq!(figures(Measures::WITHOUT_CIRCLES), without_circles);
     let circles = Figures { contour: None, orientation: None, corners: Vec::new(), ..all };
-    assert_eq!(figures(Measures { contour: false, circles: true }), circles);
+    assert_eq!(figures(Measures { contour: false, circles: true, energy: false }), circles);
     let axes = Figures { circles: Vec::new(), bidirectional: Vec::new(), ..circles };
     assert_eq!(figures(Measures::AXES), axes);
 }

@@ -150,6 +150,8 @@ pub struct Blend {
 pub enum ProgramEvent {
     /// Dwell (G4), s.
     Dwell(f64),
+    /// Standstill for a tool change or a change of the spindle speed, s.
+    Pause(f64),
     /// Program stop (M0).
     Stop,
     /// Optional stop (M1).

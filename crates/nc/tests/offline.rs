@@ -185,3 +185,100 @@ fn the_path_of_a_turning_table_has_no_share_of_blending_on_an_exact_path() {
     assert!(cuts.blending < 0.2e-6, "{cuts:?}");
     assert!((cuts.max - cuts.drives).abs() < 0.2e-6, "{cuts:?}");
 }
+
+/// Two operations, a rapid approach to each, a dwell, and two tool changes.
+const OPERATIONS: &str = "G21 G90 G17 G64
+T1 M6
+(Face)
+G0 X20 Y10 Z-5
+G1 X60 F1200
+G4 P0.5
+(Drill)
+T7 M6
+S5000 M3
+G0 X10
+G1 Y40 F600
+M2
+";
+
+#[test]
+fn times_and_energy_by_operation_and_tool_add_up_to_those_of_the_program() {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("operations.nc");
+    fs::write(&path, OPERATIONS).unwrap();
+    let (machine, name) = (machine(), path.to_str().unwrap());
+    let options = PartProgramOptions {
+        tool_change_time: Some(3.0),
+        spindle_time: Some(1.2),
+        ..PartProgramOptions::default()
+    };
+    let track = RefCell::new(ProgramTrack::default());
+    let source = PartProgramSource::open(name, PROGRAMS, &machine, &options, &track).unwrap();
+    let mut lines = LineErrors::new(&machine);
+    let outcome = trial::run(&trial_of(&machine), SetpointSource::Grid(Box::new(source)), |tick| {
+        lines.add(&tick, &mut track.borrow_mut());
+        Ok(())
+    });
+    let figures = outcome.unwrap().figures;
+    let program = lines.finish(name, PROGRAMS, &track.borrow(), |_| {}).unwrap();
+    let summary = &program.operations;
+    // A position cycle at each end of a kind of time, and the ramps of lines of 40 and 30 mm at 20 and 10 mm/s.
+    let cycles = 3.0 * 6e-3;
+    let times = summary.times;
+    assert!((times.total() - program.cycle_time).abs() < 1e-9, "{times:?} of {}", program.cycle_time);
+    assert!((times.dwell - 0.5).abs() < cycles, "{times:?}");
+    assert!((times.auxiliary - 7.2).abs() < 2.0 * cycles, "{times:?}");
+    assert!((5.0..5.4).contains(&times.feed) && times.rapid > 0.3, "{times:?}");
+
+    let operations: Vec<_> =
+        summary.operations.iter().map(|one| (one.line, one.text.as_str(), one.tool)).collect();
+    let expected = [(0, "", Some(1)), (3, "Face", Some(1)), (7, "Drill", Some(7))];
+    assert_eq!(operations, expected);
+    let [start, face, drill] = &summary.operations[..] else { panic!("{:?}", summary.operations) };
+    assert!(start.times.total() == start.times.auxiliary && (start.times.total() - 3.0).abs() < cycles);
+    assert!((face.times.dwell - 0.5).abs() < cycles && face.times.auxiliary == 0.0, "{face:?}");
+    assert!((2.0..2.2).contains(&face.times.feed) && (3.0..3.2).contains(&drill.times.feed));
+    assert!((drill.times.auxiliary - 4.2).abs() < cycles && drill.times.dwell == 0.0, "{drill:?}");
+
+    let total = |times: Vec<f64>| times.iter().sum::<f64>();
+    let [first, second] = &summary.tools[..] else { panic!("{:?}", summary.tools) };
+    assert_eq!([first.tool, second.tool], [Some(1), Some(7)]);
+    assert!((first.times.total() - start.times.total() - face.times.total()).abs() < 1e-9);
+    assert!((second.times.total() - drill.times.total()).abs() < 1e-9);
+
+    let input = total(figures.axes.iter().map(|axis| axis.energy.unwrap().input).collect());
+    let of_tools = total(summary.tools.iter().map(|tool| tool.energy.unwrap().input).collect());
+    let of_operations = total(summary.operations.iter().map(|one| one.energy.unwrap().input).collect());
+    let of_lines = total(summary.energy_lines.iter().map(|line| line.energy.input).collect());
+    for sum in [of_tools, of_operations, of_lines] {
+        assert!(input > 1.0 && (sum / input - 1.0).abs() < 1e-9, "{sum} J of {input} J");
+    }
+    assert!(summary.energy_lines.is_sorted_by(|a, b| a.energy.input >= b.energy.input));
+    assert!(
+        summary.energy_lines.iter().all(|line| line.line == 0 || !line.text.is_empty()),
+        "{:?}",
+        summary.energy_lines
+    );
+}
+
+/// Without energy in the figures there is none by operation, and the times are the same.
+#[test]
+fn times_do_not_need_energy() {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("times.nc");
+    fs::write(&path, POCKET).unwrap();
+    let (machine, name) = (machine(), path.to_str().unwrap());
+    let times = |measures| {
+        let (track, options) = (RefCell::new(ProgramTrack::default()), PartProgramOptions::default());
+        let source = PartProgramSource::open(name, PROGRAMS, &machine, &options, &track).unwrap();
+        let mut lines = LineErrors::new(&machine);
+        let trial = Trial { measures, ..trial_of(&machine) };
+        let outcome = trial::run(&trial, SetpointSource::Grid(Box::new(source)), |tick| {
+            lines.add(&tick, &mut track.borrow_mut());
+            Ok(())
+        });
+        outcome.unwrap();
+        lines.finish(name, PROGRAMS, &track.borrow(), |_| {}).unwrap().operations
+    };
+    let (with, without) = (times(Measures::ALL), times(Measures::WITHOUT_CIRCLES));
+    assert!(with.tools[0].energy.is_some() && without.tools[0].energy.is_none());
+    assert!(without.energy_lines.is_empty() && with.times == without.times);
+}

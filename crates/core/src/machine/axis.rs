@@ -11,7 +11,9 @@ use crate::control::{
     BacklashCompensation, BacklashOffset, CONTOUR_LOOKBACK, CurrentFilters, Delays, Feedforward, Pi, PiState,
     PositionController, PositionState, SetpointHistory, SetpointWindow, TickDelay,
 };
-use crate::drive::{ContactState, EventDrivenTransmission, LoadState, MaxwellSlip, MotorState, Plant};
+use crate::drive::{
+    ContactState, EventDrivenTransmission, LoadState, MaxwellSlip, MotorEnergy, MotorState, Plant,
+};
 use crate::state_codec::StateCodec;
 use crate::units::seconds;
 
@@ -50,6 +52,8 @@ pub struct AxisParameters {
     position_delay: TickDelay,
     velocity_delay: FeedforwardDelay,
     torque_delay: FeedforwardDelay,
+    /// Energy balance of the motor.
+    pub(super) energy: MotorEnergy,
     transmission_ratio: f64,
     inverse_ratio: f64,
     /// Kt that the drive assumes, without the deviation of the plant, N·m/A.
@@ -155,6 +159,7 @@ impl AxisParameters {
             position,
             delays,
             wind_up_feedback: f64::from(u8::from(axis.position_loop.feedback == PositionFeedback::Load)),
+            energy: MotorEnergy::new(&Plant::deviating_motor(axis), tick),
             transmission_ratio: axis.transmission_ratio,
             inverse_ratio: 1.0 / axis.transmission_ratio,
             torque_constant: motor.torque_constant,

@@ -8,7 +8,7 @@ use super::inner_loops::{
     AxisBlock, CycleStatistics, CycleTicks, DriveFeedback, DriveState, InnerLoopInputs, InnerLoopState,
     InnerLoops, TickRecord, TickSpan,
 };
-use crate::drive::{EventDrivenTransmission, LoadState, MaxwellSlip};
+use crate::drive::{EventDrivenTransmission, LoadState, MaxwellSlip, MotorState};
 use crate::simd::{Aligned, LANES};
 use crate::state_codec::StateCodec;
 
@@ -122,6 +122,13 @@ impl AxisBank {
         let (block, lane) = self.block(axis);
         let load = block.loads.get(tick).map_or(LoadState::default(), |row| row.0.lane(lane));
         (block.motors[tick].0.lane(lane), load)
+    }
+
+    /// Returns the state of the motor of an axis at the start of a tick of the last position cycle.
+    #[inline]
+    pub fn motor(&self, axis: usize, tick: usize) -> MotorState {
+        let (block, lane) = self.block(axis);
+        block.motors[tick].0.lane(lane)
     }
 
     /// Returns the current of an axis at the start of a tick of the last position cycle, A.

@@ -45,6 +45,8 @@ pub struct Machine {
     pub(super) axes: Vec<Axis>,
     pub(super) bank: AxisBank,
     pub(super) tick: u64,
+    /// True if the records of all ticks are kept.
+    pub(super) records_every_tick: bool,
     /// Forces of the couplings within a tick; empty between two ticks.
     pub(super) coupling_steps: Vec<CouplingStep>,
 }
@@ -60,7 +62,7 @@ impl Machine {
         for (axis, state) in states.iter().enumerate() {
             bank.set_state(axis, state);
         }
-        Machine { axes, bank, parameters, tick: 0, coupling_steps: Vec::new() }
+        Machine { axes, bank, parameters, tick: 0, records_every_tick: false, coupling_steps: Vec::new() }
     }
 
     /// Resets the machine to rest at `positions` (m or rad, one per axis) and tick 0.
@@ -214,7 +216,7 @@ impl Machine {
             return self.advance_ticks(self.ticks_per_period(), psec, preview);
         }
         self.execute_position_loops(psec, preview);
-        self.run(TickSpan::whole(self.bank.ticks(), false));
+        self.run(TickSpan::whole(self.bank.ticks(), self.records_every_tick));
         self.update_samples(0);
         self.tick += self.bank.ticks().position as u64;
     }

@@ -134,6 +134,12 @@ impl Simulation {
         self.grid.period
     }
 
+    /// Records the controller outputs of every tick, for the energy of the axes; see
+    /// [`Machine::record_every_tick`](crate::machine::Machine::record_every_tick).
+    pub fn record_every_tick(&mut self, every_tick: bool) {
+        self.machine.record_every_tick(every_tick);
+    }
+
     /// Returns the simulated machine.
     pub fn machine(&self) -> &Machine {
         &self.machine

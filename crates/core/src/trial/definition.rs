@@ -32,7 +32,8 @@ pub struct Trial<'a> {
 
 /// Choice of the figures that a trial computes beyond those of the axes.
 ///
-/// Figures of the axes need one sample per position cycle and little time. The others need the tool pose at every tick:
+/// Figures of the axes need one sample per position cycle and little time. Energy needs the voltage at every tick, the
+/// others the tool pose:
 /// with all of them a trial takes several times as long as the machine alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Measures {
@@ -40,15 +41,18 @@ pub struct Measures {
     pub contour: bool,
     /// Circularity of circles (ISO 230-4).
     pub circles: bool,
+    /// Electrical energy and mechanical work of the axes.
+    pub energy: bool,
 }
 
 impl Measures {
     /// All figures.
-    pub const ALL: Measures = Measures { contour: true, circles: true };
+    pub const ALL: Measures = Measures { contour: true, circles: true, energy: true };
     /// Figures of the axes only.
-    pub const AXES: Measures = Measures { contour: false, circles: false };
-    /// All figures but those of circles, each of which needs more time and memory than the rest.
-    pub const WITHOUT_CIRCLES: Measures = Measures { contour: true, circles: false };
+    pub const AXES: Measures = Measures { contour: false, circles: false, energy: false };
+    /// Contour and orientation error without circles, each of which needs more time and memory than the rest, and without
+    /// energy.
+    pub const WITHOUT_CIRCLES: Measures = Measures { contour: true, circles: false, energy: false };
 }
 
 impl Default for Measures {

@@ -11,6 +11,8 @@ pub struct Figures {
     pub duration: f64,
     /// Figures of each axis, in the order of the machine.
     pub axes: Vec<AxisFigures>,
+    /// Energy of the common DC link of all axes; `None` if it was not evaluated.
+    pub dc_link: Option<DcLinkEnergy>,
     /// Contour error; `None` without linear axes.
     pub contour: Option<ContourFigures>,
     /// Orientation error; `None` without rotary axes.
@@ -53,6 +55,38 @@ pub struct AxisFigures {
     pub outside_travel_limits_time: f64,
     /// True if the friction law was used beyond the velocities that it was fitted for.
     pub friction_extrapolated: bool,
+    /// Energy over the whole run; `None` if it was not evaluated.
+    pub energy: Option<AxisEnergy>,
+}
+
+/// Energy of one axis over a run: `input = copper_loss + mechanical_work + magnetic`.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct AxisEnergy {
+    /// Electrical input from the DC link minus what was fed back, J.
+    pub input: f64,
+    /// Electrical energy fed back to the DC link, J.
+    pub returned: f64,
+    /// Copper loss of the motor, J.
+    pub copper_loss: f64,
+    /// Work of the motor on the axis, J: against friction, gravity and loads, and the change of the kinetic energy.
+    pub mechanical_work: f64,
+    /// Change of the magnetic energy of the motor, J.
+    pub magnetic: f64,
+    /// Largest mean electrical power of a current cycle, W.
+    pub peak_power: f64,
+    /// Mean copper loss while the setpoint stands still and the motor is at rest, W; `None` if it never is.
+    pub holding_power: Option<f64>,
+}
+
+/// Energy that all axes draw together from a common DC link, which passes what one feeds back to the others.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct DcLinkEnergy {
+    /// Energy drawn from the link, J.
+    pub drawn: f64,
+    /// Energy fed back to the link, which others cannot use at that time, J.
+    pub returned: f64,
+    /// Largest mean power of a current cycle, W.
+    pub peak_power: f64,
 }
 
 /// Reference of the contour errors.

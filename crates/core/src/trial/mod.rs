@@ -7,6 +7,7 @@ mod circle;
 mod corner;
 mod cycle;
 mod definition;
+mod energy;
 mod figures;
 mod observer;
 mod path_features;
@@ -18,8 +19,8 @@ mod variants;
 
 pub use definition::{Measures, Tick, Trial, TrialError, TrialOutcome};
 pub use figures::{
-    AxisFigures, BidirectionalFigures, CircleFigures, ContourFigures, CornerFigures, Figures,
-    OrientationFigures, RapidFigures, Reference,
+    AxisEnergy, AxisFigures, BidirectionalFigures, CircleFigures, ContourFigures, CornerFigures,
+    DcLinkEnergy, Figures, OrientationFigures, RapidFigures, Reference,
 };
 pub use run::{RunOptions, run, run_compensated, run_with_options, trace};
 pub use setpoints::{

@@ -16,6 +16,7 @@ use super::circle::Circles;
 use super::corner::Corners;
 use super::cycle::PositionCycle;
 use super::definition::{Measures, Trial, TrialOutcome};
+use super::energy::EnergyMeter;
 use super::figures::{AxisFigures, ContourFigures, Figures, OrientationFigures, RapidFigures, Reference};
 use super::recorder::{SignalRecorder, ToolSample};
 
@@ -90,6 +91,7 @@ pub(super) struct Observer<'a> {
     orientation: ErrorStatistics,
     circles: Circles,
     corners: Corners,
+    energy: Option<EnergyMeter>,
     recorder: Option<SignalRecorder>,
 }
 
@@ -132,6 +134,7 @@ impl<'a> Observer<'a> {
             circles: circles.map(|p| Circles::of(p, machine)).unwrap_or_default(),
             // Without a tool there is no contour error at corners.
             corners: program.filter(|_| has_tool).map(|p| Corners::of(p, machine)).unwrap_or_default(),
+            energy: measures.energy.then(|| EnergyMeter::new(machine)),
             recorder: trial.record.then(|| SignalRecorder::new(count)),
             kinematics,
         }
@@ -144,7 +147,8 @@ impl<'a> Observer<'a> {
 
     /// Returns true if the figures need the positions at every tick.
     pub(super) fn needs_positions(&self) -> bool {
-        self.trial.measures != Measures::AXES
+        let Measures { contour, circles, .. } = self.trial.measures;
+        contour || circles
     }
 
     /// Returns the deviations of the tool at the ticks of the last position cycle; `None` without contour errors.
@@ -168,6 +172,9 @@ impl<'a> Observer<'a> {
             if cycle.is_moving {
                 self.axes[index].observe(sample, &activity);
             }
+        }
+        if let Some(energy) = &mut self.energy {
+            energy.observe(&axis);
         }
         if self.needs_positions() {
             self.kinematics.forward_batch(
@@ -274,6 +281,7 @@ impl<'a> Observer<'a> {
             outside_travel_limits_time: self.outside_travel[index] as f64
                 * seconds(machine.periods().position),
             friction_extrapolated: self.extrapolated[index],
+            energy: self.energy.as_ref().map(|energy| energy.axis(index)),
         });
         let reference = match self.tracker {
             Some(Tracker::Path(_)) => Some(Reference::Path),
@@ -284,6 +292,7 @@ impl<'a> Observer<'a> {
         Figures {
             duration: self.end,
             axes: axes.collect(),
+            dc_link: self.energy.as_ref().map(EnergyMeter::link),
             contour: reference.map(|reference| self.contour_figures(reference)),
             orientation: has_orientation
                 .then(|| OrientationFigures { max: self.orientation.max(), rms: self.orientation.rms() }),

@@ -169,6 +169,7 @@ pub(super) fn start<'a>(
     let mut simulation = Simulation::new(trial.machine, limits.clone(), 0)?;
     // The observer computes the figures.
     simulation.set_assessing(false);
+    simulation.record_every_tick(trial.measures.energy);
     let submitter = TrajectorySubmitter::new(setpoints, &limits, trial)?;
     let home = vec![0.0; limits.len()];
     let start = submitter.start().unwrap_or(&home).to_vec();

@@ -41,6 +41,7 @@ impl<'a> VariantBatch<'a> {
         let Some(parameters) = MachineParameters::concatenate(&parameters) else { return Ok(None) };
         let mut machine = Machine::new(Arc::new(parameters));
         let of_one: Vec<f64> = own.iter().map(|&index| start[index]).collect();
+        machine.record_every_tick(trial.measures.energy);
         machine.reset(&of_one.repeat(variants.len()));
         let indices = 0..trial.machine.axes().len();
         let own_index = indices.map(|axis| own.iter().position(|&index| index == axis)).collect();

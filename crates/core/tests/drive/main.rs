@@ -7,6 +7,7 @@ mod bits;
 mod current_filter;
 mod drive_modes;
 mod drives;
+mod energy;
 mod friction;
 mod gantry;
 mod gms;

@@ -9,10 +9,10 @@ use rayon::prelude::*;
 use virtual_axes_core::config::{MachineConfig, Parameters, Value, ValueSource};
 use virtual_axes_core::design::{ControlWeight, GpcTuning, gpc, margins};
 use virtual_axes_core::machine::prediction_model;
-use virtual_axes_core::trial::{self, Measures, Trial};
+use virtual_axes_core::trial::{self, GridRows, Measures, SetpointSource, Trial};
 use virtual_axes_identify::tune::{
     Cost, CostTerm, MarginLimits, NoProgress, Progress, SearchResult, TuneError, Tuning, TuningCandidate,
-    TuningProblem, find_contrasts, pareto_front, tune_cascade, tune_gpc,
+    TuningProblem, Workload, find_contrasts, pareto_front, tune_cascade, tune_gpc,
 };
 use virtual_axes_verification::fixtures::tuning::{
     CIRCLE, CORNER, THERE_AND_BACK, machine, program, setpoints, workload,
@@ -406,4 +406,52 @@ fn the_front_contains_the_pareto_optimal_candidates() {
         pairs
     };
     assert_eq!(on_front.iter().map(|c| (c.cost, merit(c))).collect::<Vec<_>>(), expected);
+}
+
+/// A rapid approach with a corner, a cut with one, and a rapid retreat: the cost is the error of the cut, whatever the
+/// rapids do.
+#[test]
+fn the_cost_of_a_tuning_is_the_error_of_the_cuts() {
+    let parameters = machine(&["x", "y"]);
+    let config = parameters.machine_config().expect("a machine");
+    // Legs at rest at both ends, by the cosine law: end, position cycles, rapid traverse.
+    let legs: [([f64; 2], usize, bool); 6] = [
+        ([8e-3, 0.0], 30, true),
+        ([8e-3, 6e-3], 30, true),
+        ([10e-3, 6e-3], 40, false),
+        ([10e-3, 8e-3], 40, false),
+        ([2e-3, 8e-3], 30, true),
+        ([0.0, 0.0], 30, true),
+    ];
+    let (mut rows, mut rapid, mut from) = (vec![0.0; 2], vec![true], [0.0; 2]);
+    for (to, cycles, is_rapid) in legs {
+        for k in 1..=cycles {
+            let share = 0.5 * (1.0 - (std::f64::consts::PI * k as f64 / cycles as f64).cos());
+            rows.extend([0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis])));
+            rapid.push(is_rapid);
+        }
+        from = to;
+    }
+    let workload = |rapid: &[bool]| {
+        let source = SetpointSource::Grid(Box::new(GridRows::new(&[0, 1], &rows).with_rapid(rapid)));
+        Workload::read("test", None, source, || Ok(())).expect("setpoints")
+    };
+    let cost = Cost::default();
+    let cuts = workload(&rapid);
+    let problem = TuningProblem::new(&parameters, &cuts, &cost, &NoProgress).expect("a tuning problem");
+    let found = tune_gpc(&problem, &MarginLimits::default()).expect("a tuning").best;
+    let contour = |one: &TuningCandidate| one.figures.contour.expect("a contour error");
+    for one in [problem.present(), &found] {
+        let rapids = contour(one).rapids.expect("rapid traverse");
+        assert_eq!(one.cost, contour(one).max / MICROMETER);
+        // The larger error of the rapids is not in the cost.
+        assert!(rapids.max > contour(one).max, "{:?}", contour(one));
+    }
+    assert!(found.cost < problem.present().cost, "{} of {}", found.cost, problem.present().cost);
+    // The same setpoints, all at feed: the cost is the error that was one of the rapids.
+    let all = workload(&vec![false; rapid.len()]);
+    let at_feed = TuningProblem::new(&parameters, &all, &cost, &NoProgress).expect("a tuning problem");
+    let rapids = contour(problem.present()).rapids.expect("rapid traverse");
+    assert!(contour(at_feed.present()).rapids.is_none());
+    assert_eq!(at_feed.present().cost, rapids.max / MICROMETER);
 }

@@ -5,10 +5,14 @@
 use serde_json::{Map, Value, json};
 use virtual_axes_core::config::AxisUnits;
 use virtual_axes_core::trial::{
-    AxisFigures, BidirectionalFigures, CircleFigures, CornerFigures, Figures, Reference,
+    AxisEnergy, AxisFigures, BidirectionalFigures, CircleFigures, CornerFigures, DcLinkEnergy, Figures,
+    Reference,
 };
 use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MICROMETER, MILLIDEGREE, MILLIMETER};
-use virtual_axes_nc::offline::{ProgramFigures, ProgrammedErrors, WorstLine};
+use virtual_axes_nc::offline::{
+    LineEnergy, OperationFigures, ProgramEnergy, ProgramFigures, ProgramTimes, ProgrammedErrors, ToolFigures,
+    WorstLine,
+};
 
 /// Returns all figures as a JSON object, the keys of `virtual_axes run --json` (docs/reference/json.md).
 pub fn figures_json(figures: &Figures) -> Map<String, Value> {
@@ -16,6 +20,7 @@ pub fn figures_json(figures: &Figures) -> Map<String, Value> {
     object.insert("duration_s".to_owned(), json!(figures.duration));
     let axes = figures.axes.iter().map(|axis| (axis.name.clone(), self::axis(axis)));
     object.insert("axes".to_owned(), Value::Object(axes.collect()));
+    object.extend(figures.dc_link.map(|link| ("dc_link".to_owned(), dc_link(&link))));
     object.insert("contour_error_um".to_owned(), contour(figures));
     object.insert("orientation_error_mdeg".to_owned(), orientation(figures));
     object.insert("circles".to_owned(), figures.circles.iter().map(circle).collect());
@@ -24,6 +29,55 @@ pub fn figures_json(figures: &Figures) -> Map<String, Value> {
     object.insert("corners".to_owned(), figures.corners.iter().map(corner).collect());
     object.insert("more_corners".to_owned(), json!(figures.more_corners));
     object
+}
+
+fn dc_link(link: &DcLinkEnergy) -> Value {
+    json!({ "drawn_j": link.drawn, "returned_j": link.returned, "peak_power_w": link.peak_power })
+}
+
+fn axis_energy(energy: &AxisEnergy) -> Value {
+    json!({
+        "input_j": energy.input,
+        "returned_j": energy.returned,
+        "copper_loss_j": energy.copper_loss,
+        "mechanical_work_j": energy.mechanical_work,
+        "magnetic_j": energy.magnetic,
+        "peak_power_w": energy.peak_power,
+        "holding_power_w": energy.holding_power,
+    })
+}
+
+/// Returns times and energy of a part of a program.
+fn part(times: &ProgramTimes, energy: Option<ProgramEnergy>) -> Map<String, Value> {
+    let mut object = Map::new();
+    let times = json!({
+        "feed": times.feed,
+        "rapid": times.rapid,
+        "dwell": times.dwell,
+        "auxiliary": times.auxiliary,
+        "total": times.total(),
+    });
+    object.insert("times_s".to_owned(), times);
+    object.insert("energy".to_owned(), energy.map_or(Value::Null, |energy| program_energy(&energy)));
+    object
+}
+
+fn program_energy(energy: &ProgramEnergy) -> Value {
+    json!({ "input_j": energy.input, "copper_loss_j": energy.copper_loss })
+}
+
+fn operation(operation: &OperationFigures) -> Value {
+    let mut object = part(&operation.times, operation.energy);
+    object.insert("line".to_owned(), json!(operation.line));
+    object.insert("text".to_owned(), json!(operation.text));
+    object.insert("tool".to_owned(), json!(operation.tool));
+    Value::Object(object)
+}
+
+fn tool(tool: &ToolFigures) -> Value {
+    let mut object = part(&tool.times, tool.energy);
+    object.insert("tool".to_owned(), json!(tool.tool));
+    Value::Object(object)
 }
 
 /// Returns times and worst lines of a part program as a JSON object, `part_program` of `virtual_axes run --json`.
@@ -40,6 +94,7 @@ pub fn part_program_json(figures: &ProgramFigures) -> Value {
             "time_s": worst.time,
         })
     };
+    let energy_line = |one: &LineEnergy| json!({ "line": one.line, "text": one.text, "energy": program_energy(&one.energy) });
     let errors = |errors: ProgrammedErrors| {
         json!({
             "max": errors.max / MICROMETER,
@@ -52,6 +107,10 @@ pub fn part_program_json(figures: &ProgramFigures) -> Value {
         "contour_error_um": { "cuts": figures.cuts.map(errors), "rapids": figures.rapids.map(errors) },
         "cycle_time_s": figures.cycle_time,
         "programmed_time_s": figures.programmed_time,
+        "times_s": part(&figures.operations.times, None)["times_s"],
+        "tools": figures.operations.tools.iter().map(tool).collect::<Vec<_>>(),
+        "operations": figures.operations.operations.iter().map(operation).collect::<Vec<_>>(),
+        "energy_lines": figures.operations.energy_lines.iter().map(energy_line).collect::<Vec<_>>(),
         "worst_lines": figures.worst_lines.iter().map(line).collect::<Vec<_>>(),
         "worst_rapids": figures.worst_rapids.iter().map(line).collect::<Vec<_>>(),
     })
@@ -60,7 +119,7 @@ pub fn part_program_json(figures: &ProgramFigures) -> Value {
 fn axis(axis: &AxisFigures) -> Value {
     let AxisUnits { error: scale, error_key: unit, .. } = AxisUnits::for_kind(axis.kind);
     let report = &axis.report;
-    json!({
+    let mut object = json!({
         "unit": unit,
         "moves": axis.moves,
         "following_error": {
@@ -76,7 +135,11 @@ fn axis(axis: &AxisFigures) -> Value {
         "control_activity_a": report.control_activity,
         "outside_travel_limits_s": axis.outside_travel_limits_time,
         "friction_extrapolated": axis.friction_extrapolated,
-    })
+    });
+    if let Some(energy) = &axis.energy {
+        object["energy"] = axis_energy(energy);
+    }
+    object
 }
 
 fn contour(figures: &Figures) -> Value {

@@ -196,9 +196,9 @@ impl State {
     }
 
     /// Appends a standstill for an auxiliary function, s.
-    fn push_pause(&mut self, time: f64) {
+    pub(super) fn push_pause(&mut self, time: f64) {
         if time > 0.0 {
-            self.push_event(ProgramEvent::Dwell(time));
+            self.push_event(ProgramEvent::Pause(time));
         }
     }
 

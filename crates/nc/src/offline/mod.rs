@@ -1,10 +1,14 @@
 //! Part programs simulated without a node: their setpoints, and the lines with the largest errors.
 
 mod extent;
+mod operations;
 mod setpoints;
 mod survey;
 mod worst_lines;
 
+pub use operations::{
+    LineEnergy, OperationFigures, OperationSummary, ProgramEnergy, ProgramTimes, ToolFigures,
+};
 pub use setpoints::{OverrideSchedule, PartProgramOptions, PartProgramSource, ProgramTrack};
 pub use survey::ProgramSurvey;
 pub use worst_lines::{

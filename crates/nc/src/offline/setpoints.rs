@@ -10,13 +10,14 @@ use virtual_axes_core::trajectory::PathPlace;
 use virtual_axes_core::trial::{GridSource, SourceError};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
+use super::operations::comment_lines;
 use crate::builtin::{ProgramReader, open_program, program_folder};
 use crate::interpret::{
     DetectedDialect, Dialect, IgnoredCodes, InterpretationReport, Interpreter, InterpreterOptions,
     Occurrences, ProgramError, ToolTable, WorkOffset,
 };
 use crate::motion::{Blend, PathControl, ProgramEvent, ProgramStep};
-use crate::plan::{FeedPlanError, PartProgramPlanner, PlanOptions, ProgrammedPath};
+use crate::plan::{FeedPlanError, PartProgramPlanner, PlanOptions, ProgramActivity, ProgrammedPath};
 
 /// Hour, s.
 const HOUR: f64 = 3600.0;
@@ -118,15 +119,17 @@ impl PartProgramOptions {
 /// Setpoints that are not simulated yet, and the times of the program.
 #[derive(Debug, Clone, Default)]
 pub struct ProgramTrack {
-    /// Places of the setpoints in order.
-    pub setpoints: VecDeque<PathPlace>,
+    /// Places and activities of the setpoints in order.
+    pub setpoints: VecDeque<(PathPlace, ProgramActivity)>,
+    /// Lines of comments that begin an operation, with their texts.
+    pub comments: Vec<(usize, String)>,
     /// Programmed path of these setpoints and beyond.
     pub programmed: ProgrammedPath,
     /// Time from the first to the last setpoint, s.
     pub cycle_time: f64,
     /// Duration of all motions at their programmed feed, s.
     pub programmed_time: f64,
-    /// Duration of all dwells read, s.
+    /// Duration of all dwells and pauses read, s.
     pub dwell_time: f64,
     /// Farthest source line that was read, from 1.
     pub lines_read: usize,
@@ -182,7 +185,10 @@ impl Iterator for NotedSteps<'_> {
                     track.merge_tolerance.get_or_insert(motion.line);
                 }
             }
-            Some(Ok(ProgramStep::Event { event: ProgramEvent::Dwell(time), .. })) => track.dwell_time += time,
+            Some(Ok(ProgramStep::Event {
+                event: ProgramEvent::Dwell(time) | ProgramEvent::Pause(time),
+                ..
+            })) => track.dwell_time += time,
             Some(Ok(ProgramStep::Event { line, event: ProgramEvent::Stop | ProgramEvent::OptionalStop })) => {
                 track.stop.get_or_insert(*line);
             }
@@ -223,7 +229,9 @@ impl<'a> PartProgramSource<'a> {
         let subprogram_folder = program_folder(name, builtin);
         let interpreter = options.interpreter(machine).map_err(|error| format!("{name}: {error}"))?;
         let interpreter = InterpreterOptions { subprogram_folder, ..interpreter };
-        track.replace(ProgramTrack::default());
+        let comments = open_program(name, builtin).and_then(comment_lines);
+        let comments = comments.map_err(|error| format!("{name}: {error}"))?;
+        track.replace(ProgramTrack { comments, ..ProgramTrack::default() });
         let interpreter = Interpreter::new(file, name, interpreter);
         let mut planner = PartProgramPlanner::new(NotedSteps { interpreter, track }, machine, options.plan)
             .map_err(|error| format!("{name}: {error}"))?;
@@ -282,7 +290,7 @@ impl GridSource for PartProgramSource<'_> {
         self.planner.take_programmed_path(&self.kinematics, &mut track.programmed);
         row.copy_from_slice(setpoint.psec());
         self.is_rapid = setpoint.place.programmed_feed.is_infinite();
-        track.setpoints.push_back(setpoint.place);
+        track.setpoints.push_back((setpoint.place, setpoint.activity));
         track.cycle_time = time;
         self.cycle += 1;
         Ok(true)

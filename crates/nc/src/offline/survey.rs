@@ -110,7 +110,10 @@ impl ProgramSurvey {
                         survey.work_offsets.insert(index, offset);
                     }
                 }
-                Ok(ProgramStep::Event { event: ProgramEvent::Dwell(time), .. }) => survey.time += time,
+                Ok(ProgramStep::Event {
+                    event: ProgramEvent::Dwell(time) | ProgramEvent::Pause(time),
+                    ..
+                }) => survey.time += time,
                 Ok(ProgramStep::Event { .. }) => {}
                 Err(error) => failure = Some(error),
             }

@@ -13,6 +13,7 @@ use virtual_axes_core::trajectory::PathPlace;
 use virtual_axes_core::trial::Tick;
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
+use super::operations::{OperationMeter, OperationSummary};
 use super::setpoints::ProgramTrack;
 use crate::builtin::open_program;
 use crate::plan::{ProgrammedCorner, ProgrammedPath};
@@ -137,6 +138,8 @@ pub struct ProgramFigures {
     pub cycle_time: f64,
     /// Duration of all motions at their programmed feed, s.
     pub programmed_time: f64,
+    /// Times and energy by operation, tool and line.
+    pub operations: OperationSummary,
     /// Contour errors of motions at feed; `None` without any.
     pub cuts: Option<ProgrammedErrors>,
     /// Contour errors at rapid traverse; `None` without any.
@@ -216,6 +219,7 @@ pub struct LineErrors {
     poses: VecDeque<(ToolPose, Nanoseconds, ToolPose)>,
     turn: StandingTurn,
     programmed: ProgrammedPath,
+    operations: OperationMeter,
     /// Corners that are being passed.
     corners: VecDeque<PassedCorner>,
     /// Contour errors of motions at feed and at rapid traverse.
@@ -245,6 +249,7 @@ impl LineErrors {
             passed: 0,
             turn: StandingTurn::default(),
             programmed: ProgrammedPath::default(),
+            operations: OperationMeter::new(machine),
             corners: VecDeque::new(),
             sums: Default::default(),
             worst: Default::default(),
@@ -265,7 +270,9 @@ impl LineErrors {
         let joints: Vec<f64> = samples().map(|sample| sample.psec).collect();
         let start = PathPlace { programmed_feed: f64::INFINITY, ..PathPlace::default() };
         let last = self.window.back();
-        let place = track.setpoints.pop_front().or(last.map(|last| last.place)).unwrap_or(start);
+        let (place, activity) = track.setpoints.pop_front().unzip();
+        self.operations.add(&track.comments, activity, tick.machine);
+        let place = place.or(last.map(|last| last.place)).unwrap_or(start);
         let moves = |linear: bool| {
             let steps =
                 last.into_iter().flat_map(|last| last.joints.iter().zip(&joints)).zip(&self.is_linear);
@@ -475,15 +482,26 @@ impl LineErrors {
             self.record_corner(passed);
         }
         self.explain(0);
-        let numbers = self.worst.iter().flatten().map(|(worst, _)| worst.line).collect();
+        let mut operations = self.operations.finish(&track.comments);
+        let numbers = self.worst.iter().flatten().map(|(worst, _)| worst.line);
+        let numbers = numbers.chain(operations.energy_lines.iter().map(|one| one.line)).collect();
         let texts = line_texts(name, builtin, &numbers)?;
         let text = |line: usize| texts.get(&line).cloned().unwrap_or_default();
         let [worst_lines, worst_rapids] = self.worst.map(|lines| {
             lines.into_iter().map(|(worst, _)| WorstLine { text: text(worst.line), ..worst }).collect()
         });
+        operations.energy_lines.iter_mut().for_each(|one| one.text = text(one.line));
         let ProgramTrack { cycle_time, programmed_time, .. } = *track;
         let [cuts, rapids] = self.sums.map(|sums| sums.figures());
-        Ok(ProgramFigures { cycle_time, programmed_time, cuts, rapids, worst_lines, worst_rapids })
+        Ok(ProgramFigures {
+            cycle_time,
+            programmed_time,
+            operations,
+            cuts,
+            rapids,
+            worst_lines,
+            worst_rapids,
+        })
     }
 }
 

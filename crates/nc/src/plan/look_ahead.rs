@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use super::activity::{ProgramActivity, ProgramStop};
 use super::error::FeedPlanError;
 use super::interval_motion::{IntervalMotion, Law, motions, straight_line};
 use super::machine_model::{MachineModel, Surroundings};
@@ -43,6 +44,8 @@ pub(super) struct PlannedInterval {
     /// Start of the interval from the start of the piece.
     pub from: f64,
     pub motion: Option<IntervalMotion>,
+    /// Activity of a standstill.
+    pub standstill: Option<ProgramActivity>,
     /// True if the motion stops at the end of the interval.
     is_stop: bool,
 }
@@ -174,10 +177,13 @@ impl<'a> LookAhead<'a> {
                     self.is_finished = true;
                     return Ok(());
                 }
-                Some(Part::Stop(0.0)) => {}
-                Some(Part::Stop(time)) => {
+                Some(Part::Stop(ProgramStop { time: 0.0, .. })) => {}
+                Some(Part::Stop(ProgramStop { time, activity })) => {
                     let piece = self.last_piece.clone();
                     self.push_motions(piece.as_ref(), vec![IntervalMotion::dwell(time)]);
+                    if let Some(entry) = self.entries.back_mut() {
+                        entry.standstill = Some(activity);
+                    }
                     return Ok(());
                 }
                 Some(Part::Path(piece)) => {
@@ -191,8 +197,15 @@ impl<'a> LookAhead<'a> {
                     self.model.divide(&piece, &around, |from, interval| {
                         ahead += rate_time(&interval);
                         let (interval, piece) = (Some(interval), Some(Arc::clone(&piece)));
-                        let is_stop = false;
-                        entries.push_back(PlannedInterval { interval, piece, from, motion: None, is_stop });
+                        let (motion, standstill, is_stop) = (None, None, false);
+                        entries.push_back(PlannedInterval {
+                            interval,
+                            piece,
+                            from,
+                            motion,
+                            standstill,
+                            is_stop,
+                        });
                     });
                     if let Some(last) = entries.back_mut() {
                         last.is_stop = piece.is_stop;
@@ -213,7 +226,7 @@ impl<'a> LookAhead<'a> {
             return Ok(self.next.take());
         }
         Ok(self.source.next()?.map(|part| match part {
-            Part::Stop(time) => Part::Stop(time),
+            Part::Stop(standstill) => Part::Stop(standstill),
             Part::Path(mut piece) => {
                 piece.scale_feed(self.feed_factor);
                 Part::Path(Arc::new(piece))
@@ -264,6 +277,7 @@ impl<'a> LookAhead<'a> {
                 piece: piece.map(Arc::clone),
                 from,
                 motion: Some(motion),
+                standstill: None,
                 is_stop: true,
             });
             from += length;

@@ -11,6 +11,7 @@
 //!
 //! Limits hold for the continuous motion, so that differences of setpoints at any position period keep them.
 
+mod activity;
 mod band;
 mod blended_path;
 mod chunk;
@@ -30,6 +31,7 @@ mod speed;
 mod vector;
 mod window;
 
+pub use activity::{ProgramActivity, TimeKind};
 pub use chunk::PlannedChunk;
 pub use error::{FeedPlanError, StepError};
 pub use planner::{PartProgramPlanner, PlanOptions, PlannedSetpoint};

@@ -77,6 +77,7 @@ pub(super) struct MotionCurve {
     pub to: JointVector,
     pub length: f64,
     pub line: usize,
+    pub tool: Option<u32>,
     pub feed: f64,
     pub cap: FeedCap,
     pub tcp_length: Option<f64>,

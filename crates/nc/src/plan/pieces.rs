@@ -18,6 +18,7 @@ pub(super) struct Mark {
     /// Path parameter at the end of the motion.
     pub end: f64,
     pub line: usize,
+    pub tool: Option<u32>,
     /// Programmed feed; infinite at rapid traverse.
     pub feed: f64,
 }
@@ -69,7 +70,7 @@ impl<'a> PieceSource<'a> {
             self.fill()?;
             let curve = match self.ahead.take() {
                 None => return Ok(None),
-                Some(Part::Stop(dwell)) => return Ok(Some(Part::Stop(dwell))),
+                Some(Part::Stop(standstill)) => return Ok(Some(Part::Stop(standstill))),
                 Some(Part::Path(curve)) => curve,
             };
             if is_blended(&curve) {
@@ -111,7 +112,7 @@ impl<'a> PieceSource<'a> {
         }
         self.end += curve.length;
         self.programmed_time += curve.programmed_time();
-        self.marks.push_back(Mark { end: self.end, line: curve.line, feed: curve.feed });
+        self.marks.push_back(Mark { end: self.end, line: curve.line, tool: curve.tool, feed: curve.feed });
     }
 
     fn next_blended(&mut self) -> Result<Option<Piece>, FeedPlanError> {

@@ -8,6 +8,7 @@ use virtual_axes_core::trajectory::feed_override::{FeedControl, check_feed_overr
 use virtual_axes_core::trajectory::{JointLimits, PathPlace};
 use virtual_axes_core::units::seconds;
 
+use super::activity::{ProgramActivity, TimeKind};
 use super::error::{FeedPlanError, StepError};
 use super::interval_motion::Law;
 use super::look_ahead::{LookAhead, PlannedInterval};
@@ -51,6 +52,8 @@ pub struct PlannedSetpoint {
     pub(super) psec: JointVector,
     /// Place on the path. A radian of the rotary axes counts as 0.1 m of the path position, in the root of the sum of squares.
     pub place: PathPlace,
+    /// Activity in the position cycle that ends at this setpoint.
+    pub activity: ProgramActivity,
     joints: usize,
 }
 
@@ -141,7 +144,12 @@ impl<'a> PartProgramPlanner<'a> {
         let parts = PartSource::new(steps, axes, [options.blend_tolerance, options.rotary_tolerance]);
         let ahead = LookAhead::new(PieceSource::new(parts, options.knot_distance), Arc::new(model));
         let place = PathPlace { programmed_feed: f64::INFINITY, ..PathPlace::default() };
-        let last = PlannedSetpoint { psec: ORIGIN, place, joints: limits.len() };
+        let last = PlannedSetpoint {
+            psec: ORIGIN,
+            place,
+            activity: ProgramActivity::default(),
+            joints: limits.len(),
+        };
         let control = FeedControl::new(&limits, nanoseconds, &ORIGIN[..limits.len()], 1.0);
         Ok(Self {
             ahead,
@@ -264,6 +272,10 @@ impl<'a> PartProgramPlanner<'a> {
     /// Sets the setpoints at the fraction `pace` of the planned speed; after the program, to the end of its last interval.
     fn set_state(&mut self, ended: Option<PlannedInterval>, pace: f64) {
         let Some(entry) = ended.as_ref().or(self.ahead.entries.front()) else { return };
+        let standstill = entry.standstill;
+        if let Some(activity) = standstill {
+            self.last.activity = activity;
+        }
         let (Some(motion), Some(piece)) = (&entry.motion, &entry.piece) else {
             self.last.place.path_rate = 0.0;
             return;
@@ -284,6 +296,10 @@ impl<'a> PartProgramPlanner<'a> {
         if let Some(mark) = marks.front() {
             self.last.place.line = mark.line;
             self.last.place.programmed_feed = mark.feed;
+            if standstill.is_none() {
+                let kind = if mark.feed.is_infinite() { TimeKind::Rapid } else { TimeKind::Feed };
+                self.last.activity = ProgramActivity { kind, line: mark.line, tool: mark.tool };
+            }
         }
     }
 

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use virtual_axes_core::trajectory::JointLimits;
 
+use super::activity::{ProgramActivity, ProgramStop, TimeKind};
 use super::blended_path::ARC_DEVIATION;
 use super::error::{FeedPlanError, StepError};
 use super::motion_curve::{Arc, BlendTolerance, CurveEnd, FeedCap, FeedJoints, MotionCurve, Shape};
@@ -23,8 +24,7 @@ const MIN_TOLERANCE: f64 = 1e-8;
 #[derive(Debug, Clone)]
 pub(super) enum Part<T> {
     Path(T),
-    /// Standstill, s.
-    Stop(f64),
+    Stop(ProgramStop),
 }
 
 /// Axes of the machine and their programmed letters.
@@ -70,6 +70,8 @@ pub(super) struct PartSource<'a> {
     end: Option<Coordinates>,
     /// Tool length of the last motion.
     tcp_length: Option<f64>,
+    /// Tool in the spindle.
+    tool: Option<u32>,
     pending: VecDeque<Part<MotionCurve>>,
     is_finished: bool,
 }
@@ -77,7 +79,16 @@ pub(super) struct PartSource<'a> {
 impl<'a> PartSource<'a> {
     pub fn new(steps: ProgramSteps<'a>, axes: ProgramAxes, default_tolerance: BlendTolerance) -> Self {
         let pending = VecDeque::new();
-        Self { steps, axes, default_tolerance, end: None, tcp_length: None, pending, is_finished: false }
+        Self {
+            steps,
+            axes,
+            default_tolerance,
+            end: None,
+            tcp_length: None,
+            tool: None,
+            pending,
+            is_finished: false,
+        }
     }
 
     /// Returns the joints by kind of movement.
@@ -108,17 +119,25 @@ impl<'a> PartSource<'a> {
 
     fn add_event(&mut self, line: usize, event: &ProgramEvent) -> Result<(), FeedPlanError> {
         match event {
-            ProgramEvent::Dwell(time) if !(time.is_finite() && *time >= 0.0) => {
+            ProgramEvent::Dwell(time) | ProgramEvent::Pause(time) if !(time.is_finite() && *time >= 0.0) => {
                 return Err(FeedPlanError::NotFinite { line, what: "dwell", value: *time });
             }
-            ProgramEvent::Dwell(time) => self.pending.push_back(Part::Stop(*time)),
-            ProgramEvent::Stop | ProgramEvent::OptionalStop | ProgramEvent::ToolChange(_) => {
-                self.pending.push_back(Part::Stop(0.0));
+            ProgramEvent::Dwell(time) => self.push_stop(*time, TimeKind::Dwell, line),
+            ProgramEvent::Pause(time) => self.push_stop(*time, TimeKind::Auxiliary, line),
+            ProgramEvent::Stop | ProgramEvent::OptionalStop => self.push_stop(0.0, TimeKind::Auxiliary, line),
+            ProgramEvent::ToolChange(tool) => {
+                self.tool = Some(*tool);
+                self.push_stop(0.0, TimeKind::Auxiliary, line);
             }
             ProgramEvent::End => self.is_finished = true,
             _ => {}
         }
         Ok(())
+    }
+
+    fn push_stop(&mut self, time: f64, kind: TimeKind, line: usize) {
+        let activity = ProgramActivity { kind, line, tool: self.tool };
+        self.pending.push_back(Part::Stop(ProgramStop { time, activity }));
     }
 
     fn add(&mut self, motion: &ProgramMotion) -> Result<(), FeedPlanError> {
@@ -220,8 +239,8 @@ impl<'a> PartSource<'a> {
             PathControl::ExactPath => CurveEnd::ExactPath,
             PathControl::ExactStop => CurveEnd::Stop,
         };
-        let (line, tcp_length) = (motion.line, motion.tcp_length);
-        let curve = MotionCurve { shape, from, to, length, line, feed, cap, tcp_length, at_end };
+        let (line, tcp_length, tool) = (motion.line, motion.tcp_length, self.tool);
+        let curve = MotionCurve { shape, from, to, length, line, tool, feed, cap, tcp_length, at_end };
         self.pending.push_back(Part::Path(curve));
     }
 
@@ -255,7 +274,7 @@ impl<'a> PartSource<'a> {
         let blend = PathControl::Blend(Blend { tolerance: Some(tolerance - error), ..blend });
         self.push(&ProgramMotion { path_control: blend, ..motion.clone() }, Shape::Spline(table), from, to);
         if !matches!(motion.path_control, PathControl::Blend(_)) {
-            self.pending.push_back(Part::Stop(0.0));
+            self.push_stop(0.0, TimeKind::Feed, motion.line);
         }
         Ok(())
     }

@@ -93,8 +93,8 @@ def nc_program(
     """Names a part program in G code: a built-in one (`nc_program_names()`) or a file.
 
     It is read and planned when it is simulated. Words that have no effect then give a `UserWarning` with file and line.
-    The figures of a run have its times and its lines with the largest contour errors, `figures["part_program"]`, unless
-    only those of the axes are computed.
+    The figures of a run have its times and energy by tool and operation and its lines with the largest contour errors,
+    `figures["part_program"]`, unless only those of the axes are computed.
 
     `feed_override` is above 0 and at most 2, 1 for the programmed feed. `ignore` contains M codes without effect, as
     `[7, "M110"]`. `chord_error` bounds the chord error of the setpoints as a polyline, m, and

@@ -169,8 +169,8 @@ class Machine:
         row per position cycle, of which the last one holds, or one value for each axis; axes without one have no load.
 
         `signals` are those of `SIGNALS` and `TOOL_SIGNALS` to record, by default all, at every position cycle, or with
-        `every_tick` at every current cycle. `figures` is `all`, `contour` (all but circles) or `axes`, which is the
-        fastest and has no signals of the tool.
+        `every_tick` at every current cycle. `figures` is `all`, `contour` (all but circles and energy) or `axes`, which
+        is the fastest and has no signals of the tool.
 
         Raises `ValueError` for setpoints of another shape or that the machine rejects, with time, axis and limit;
         `TypeError` for anything but real numbers.

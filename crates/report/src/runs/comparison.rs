@@ -19,6 +19,12 @@ pub fn tables(runs: &[SimulatedRun]) -> [Table; 3] {
     ]
 }
 
+/// Creates the table of energy and power, as [`tables`].
+pub fn energy(runs: &[SimulatedRun]) -> Table {
+    let figures: Vec<_> = runs.iter().map(|run| figure::of_energy(&run.outcome.figures)).collect();
+    columns_of("Energy", runs, &figures)
+}
+
 fn columns_of(caption: &str, runs: &[SimulatedRun], figures: &[Vec<Figure>]) -> Table {
     let mut table = Table::new(caption, &[("figure", ""), ("unit", "")]);
     match runs {

@@ -14,7 +14,7 @@ pub struct Figure {
     pub name: String,
     /// Unit of the value.
     pub unit: &'static str,
-    /// Value in its unit.
+    /// Value in its unit; NaN for none.
     pub value: f64,
     /// Number of decimals in tables.
     pub decimals: usize,
@@ -50,8 +50,11 @@ impl Figure {
         }
     }
 
-    /// Returns the value with its decimals, without a negative zero.
+    /// Returns the value with its decimals, without a negative zero; a dash for none.
     pub fn text(&self) -> String {
+        if self.value.is_nan() {
+            return "–".to_owned();
+        }
         rounded(self.value, self.decimals).replace('-', "−")
     }
 
@@ -123,6 +126,34 @@ fn of_axis(axis: &AxisFigures) -> Vec<Figure> {
         new("time at a limit", r.saturation_time, "s").with_decimals(3),
         new("control activity", r.control_activity, "A").with_decimals(3),
     ]
+}
+
+/// Returns energy and power of the moving axes, or of all axes if none moves, and of the common DC link.
+pub fn of_energy(figures: &Figures) -> Vec<Figure> {
+    let none_moves = figures.axes.iter().all(|axis| !axis.moves);
+    let axes = figures.axes.iter().filter(|axis| axis.moves || none_moves);
+    let mut found: Vec<Figure> = axes
+        .filter_map(|axis| Some((axis, axis.energy?)))
+        .flat_map(|(axis, energy)| {
+            let new = |name: &str, value: f64, unit| Figure::new(&axis.name, name, value, unit);
+            let holding = energy.holding_power.unwrap_or(f64::NAN);
+            [
+                new("electrical input", energy.input, "J").signed(),
+                new("copper loss", energy.copper_loss, "J"),
+                new("mechanical work", energy.mechanical_work, "J").signed(),
+                new("energy fed back", energy.returned, "J"),
+                new("peak power", energy.peak_power, "W").with_decimals(0),
+                new("holding power", holding, "W").with_decimals(2),
+            ]
+        })
+        .collect();
+    if let Some(link) = figures.dc_link {
+        let new = |name: &str, value: f64, unit| Figure::new("DC link", name, value, unit);
+        found.push(new("energy drawn", link.drawn, "J"));
+        found.push(new("energy fed back", link.returned, "J"));
+        found.push(new("peak power", link.peak_power, "W").with_decimals(0));
+    }
+    found
 }
 
 /// Returns the contour errors of a part program against its programmed path.

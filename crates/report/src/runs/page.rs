@@ -8,7 +8,7 @@ use virtual_axes_core::units::{MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded,
 
 use super::{SimulatedRun, comparison, table, verdict};
 use crate::text::capital;
-use crate::{Report, ReportRun, Section};
+use crate::{Report, ReportRun, Section, Table};
 
 /// Contents of the page of one or several simulated runs of one trial.
 #[derive(Debug)]
@@ -42,7 +42,10 @@ impl SimulationPage<'_> {
             title: self.title,
             description: self.description,
             verdict: verdict::lines(self.runs),
-            tables: comparison::tables(self.runs).to_vec(),
+            tables: comparison::tables(self.runs)
+                .into_iter()
+                .chain([comparison::energy(self.runs)])
+                .collect(),
             notes: comparison::note(self.runs)
                 .into_iter()
                 .chain(comparison::spike_note(self.runs))
@@ -72,9 +75,18 @@ impl SimulationPage<'_> {
             let Some(program) = &run.part_program else { continue };
             let of_run = if self.runs.len() > 1 { format!("{}: ", run.title()) } else { String::new() };
             section.paragraphs.push(capital(&format!("{of_run}{}.", program.times())));
+            section.paragraphs.push(capital(&format!("{of_run}{}.", program.time_shares())));
             section.tables.push(
                 program.page_table(capital(&format!("{of_run}lines with the largest contour errors")), index),
             );
+            let parts = [
+                ("times by operation", program.operations_table(usize::MAX, str::to_owned)),
+                ("times by tool", program.tools_table()),
+                ("lines with the largest electrical input", program.energy_table(str::to_owned)),
+            ];
+            let captioned = parts
+                .map(|(caption, table)| Table { caption: capital(&format!("{of_run}{caption}")), ..table });
+            section.tables.extend(captioned);
         }
         section
     }

@@ -1,12 +1,33 @@
 //! Times, worst lines and path of a part program.
 
 use virtual_axes_core::units::{MICROMETER, MILLIDEGREE};
-use virtual_axes_nc::offline::{ProgramFigures, WorstLine};
+use virtual_axes_nc::offline::{ProgramEnergy, ProgramFigures, ProgramTimes, WorstLine};
 
 use crate::{Table, TableColumn, ToolPath};
 
 /// Number of lines at rapid traverse in tables, behind those at feed.
 const RAPIDS: usize = 3;
+
+/// Columns of times and energy.
+const TIMES: [(&str, &str); 6] = [
+    ("time", "s"),
+    ("feed", "s"),
+    ("rapid", "s"),
+    ("dwell", "s"),
+    ("auxiliary", "s"),
+    ("electrical input", "J"),
+];
+
+/// Returns the cells of [`TIMES`].
+fn part(times: &ProgramTimes, energy: Option<ProgramEnergy>) -> impl Iterator<Item = String> {
+    let ProgramTimes { feed, rapid, dwell, auxiliary } = *times;
+    let times = [times.total(), feed, rapid, dwell, auxiliary].map(|time| format!("{time:.2}"));
+    times.into_iter().chain([energy.map_or("–".to_owned(), |energy| format!("{:.1}", energy.input))])
+}
+
+fn tool_name(tool: Option<u32>) -> String {
+    tool.map_or("–".to_owned(), |tool| format!("T{tool}"))
+}
 
 /// Figures of a part program, and its path.
 #[derive(Debug, Clone)]
@@ -30,6 +51,56 @@ impl ProgramReport {
             "cycle time {:.2} s; motions at programmed feed alone {:.2} s",
             self.figures.cycle_time, self.figures.programmed_time
         )
+    }
+
+    /// Returns the times by kind of motion as one line.
+    pub fn time_shares(&self) -> String {
+        let ProgramTimes { feed, rapid, dwell, auxiliary } = self.figures.operations.times;
+        format!(
+            "feed {feed:.2} s, rapid traverse {rapid:.2} s, dwell {dwell:.2} s, auxiliary (tool changes, spindle) \
+             {auxiliary:.2} s"
+        )
+    }
+
+    /// Returns a table of the operations, of which the `most` longest; without rows if there is only one. `escape` is applied
+    /// to the texts.
+    pub fn operations_table(&self, most: usize, escape: impl Fn(&str) -> String) -> Table {
+        let operations = &self.figures.operations.operations;
+        let mut times: Vec<f64> = operations.iter().map(|one| one.times.total()).collect();
+        times.sort_by(|a, b| b.total_cmp(a));
+        let least = times.get(most.saturating_sub(1)).copied().unwrap_or(0.0);
+        let columns = [("line", ""), ("operation", ""), ("tool", "")];
+        let mut table = Table::new("", &[&columns[..], &TIMES].concat());
+        for one in operations.iter().filter(|one| operations.len() > 1 && one.times.total() >= least) {
+            let text = if one.text.is_empty() { "start".to_owned() } else { escape(&one.text) };
+            let row = [one.line.to_string(), text, tool_name(one.tool)].into_iter();
+            table.rows.push(row.chain(part(&one.times, one.energy)).collect());
+        }
+        table.rows.truncate(most);
+        table
+    }
+
+    /// Returns a table of the tools; without rows if there is only one.
+    pub fn tools_table(&self) -> Table {
+        let tools = &self.figures.operations.tools;
+        let mut table = Table::new("", &[&[("tool", "")][..], &TIMES].concat());
+        for one in tools.iter().filter(|_| tools.len() > 1) {
+            let row = std::iter::once(tool_name(one.tool)).chain(part(&one.times, one.energy));
+            table.rows.push(row.collect());
+        }
+        table
+    }
+
+    /// Returns a table of the lines with the largest electrical input; `escape` is applied to their texts.
+    pub fn energy_table(&self, escape: impl Fn(&str) -> String) -> Table {
+        let columns = [("line", ""), ("text", ""), ("electrical input", "J"), ("copper loss", "J")];
+        let mut table = Table::new("", &columns);
+        for one in &self.figures.operations.energy_lines {
+            let energies = [one.energy.input, one.energy.copper_loss].map(|energy| format!("{energy:.1}"));
+            let row = [one.line.to_string(), escape(&one.text)].into_iter().chain(energies);
+            table.rows.push(row.collect());
+        }
+        table
     }
 
     /// Returns the worst lines of the motions at feed, then those at rapid traverse, with the kind of motion.

@@ -1,7 +1,7 @@
 //! Tables of figures for the terminal and for reports.
 
 use virtual_axes_core::config::AxisUnits;
-use virtual_axes_core::trial::{AxisFigures, Figures};
+use virtual_axes_core::trial::{AxisEnergy, AxisFigures, DcLinkEnergy, Figures};
 use virtual_axes_core::units::Rounded;
 
 use crate::Table;
@@ -42,6 +42,52 @@ pub fn axes(figures: &Figures) -> Table {
         table.rows.push(row);
     }
     table
+}
+
+/// Creates the table of the energy of the axes that draw or lose any, and of the common DC link; without rows if energy was
+/// not evaluated.
+pub fn energy(figures: &Figures) -> Table {
+    let columns = [
+        ("energy", ""),
+        ("input", "J"),
+        ("copper loss", "J"),
+        ("mechanical work", "J"),
+        ("fed back", "J"),
+        ("peak power", "W"),
+        ("holding power", "W"),
+    ];
+    let mut table = Table::new("Energy", &columns);
+    let axes = figures.axes.iter().filter_map(|axis| Some((axis, axis.energy?)));
+    for (axis, energy) in axes.filter(|(axis, energy)| axis.moves || energy.copper_loss >= LEAST_ENERGY) {
+        let AxisEnergy { input, copper_loss, mechanical_work, returned, peak_power, .. } = energy;
+        let mut row = vec![axis.name.clone()];
+        row.extend([input, copper_loss, mechanical_work, returned].map(unsigned_zero));
+        row.push(format!("{peak_power:.0}"));
+        row.push(energy.holding_power.map_or("–".to_owned(), |power| format!("{power:.2}")));
+        table.rows.push(row);
+    }
+    if let (Some(link), [_, _, ..]) = (figures.dc_link, &table.rows[..]) {
+        let DcLinkEnergy { drawn, returned, peak_power } = link;
+        let none = || "–".to_owned();
+        let copper: f64 =
+            figures.axes.iter().filter_map(|axis| axis.energy).map(|energy| energy.copper_loss).sum();
+        let work: f64 =
+            figures.axes.iter().filter_map(|axis| axis.energy).map(|energy| energy.mechanical_work).sum();
+        let mut row = vec!["all (DC link)".to_owned()];
+        row.extend([drawn - returned, copper, work, returned].map(unsigned_zero));
+        row.extend([format!("{peak_power:.0}"), none()]);
+        table.rows.push(row);
+    }
+    table
+}
+
+/// Smallest copper loss of an axis at rest in the table, J.
+const LEAST_ENERGY: f64 = 0.05;
+
+/// Returns an energy with one decimal, without a negative zero.
+fn unsigned_zero(energy: f64) -> String {
+    let text = format!("{energy:.1}");
+    if text == "-0.0" { "0.0".to_owned() } else { text.replace('-', "−") }
 }
 
 /// Returns remarks on the axes, one per line.

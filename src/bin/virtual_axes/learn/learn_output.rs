@@ -57,6 +57,11 @@ impl Learned<'_> {
             self.found.best,
             runs.len() - 1
         )];
+        let rapids = |run: &LearningIteration| run.contour().and_then(|contour| contour.rapids);
+        if let Some((before, after)) = rapids(first).zip(rapids(best)) {
+            let [before, after] = [before, after].map(|rapids| rapids.max * MICRO);
+            lines[0] += &format!("; at rapid traverse {before:.2} → {after:.2} µm");
+        }
         lines.extend(learning_end_text(&self.found.end));
         if self.found.best == 0 {
             lines.push("no iteration is better than the programmed setpoints".to_owned());

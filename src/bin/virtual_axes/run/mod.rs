@@ -238,14 +238,26 @@ fn single(run: &SimulatedRun) -> Vec<String> {
     axes.extend(remarks.map(|remark| text_table::wrapped_line(&remark)));
     let path = run.path_table();
     let path = (!path.rows.is_empty()).then(|| format!("{}{}\n", text_table::text(&path), table::SAMPLING));
+    let energy = table::energy(figures);
+    let energy = (!energy.rows.is_empty()).then(|| text_table::text(&energy));
     let program = run.part_program.as_ref().map(part_program_text);
-    std::iter::once(axes).chain(path).chain(program).collect()
+    std::iter::once(axes).chain(path).chain(energy).chain(program).collect()
 }
 
-/// Returns the times of a part program and a table of its worst lines.
+/// Largest number of operations in the table; the JSON output contains all.
+const OPERATIONS: usize = 12;
+
+/// Returns the times of a part program, a table of its worst lines, and its operations and tools if there are several.
 fn part_program_text(program: &ProgramReport) -> String {
-    let table = text_table::aligned(&program.worst_table(escaped), &[1, 2, 3]);
-    text_table::wrapped_line(&program.times()) + &table
+    let mut text = text_table::wrapped_line(&program.times());
+    text += &text_table::wrapped_line(&program.time_shares());
+    text += &text_table::aligned(&program.worst_table(escaped), &[1, 2, 3]);
+    let parts =
+        [(program.operations_table(OPERATIONS, escaped), &[0, 1, 2][..]), (program.tools_table(), &[0][..])];
+    for (table, left) in parts.into_iter().filter(|(table, _)| !table.rows.is_empty()) {
+        text += &format!("\n{}", text_table::aligned(&table, left));
+    }
+    text
 }
 
 fn several(runs: &[SimulatedRun]) -> Vec<String> {
@@ -286,8 +298,13 @@ fn csv(runs: &[SimulatedRun]) -> String {
     let mut text = "run,figure,value,unit\n".to_owned();
     for run in runs {
         let figures = &run.outcome.figures;
-        for figure in [figure::of_axes(figures), run.path_figures(true), figure::of_circles(figures)].concat()
-        {
+        let parts = [
+            figure::of_axes(figures),
+            run.path_figures(true),
+            figure::of_circles(figures),
+            figure::of_energy(figures),
+        ];
+        for figure in parts.concat().iter().filter(|figure| !figure.value.is_nan()) {
             let cells = [run.title(), figure.title(), figure.value.to_string(), figure.unit.to_owned()];
             text.push_str(&text_table::csv_row(&cells));
         }

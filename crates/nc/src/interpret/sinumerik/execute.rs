@@ -164,6 +164,7 @@ impl Sinumerik {
         if direction.is_some() || (speed.is_some() && state.modal.spindle_direction != 0.0) {
             let speed = state.modal.spindle_direction * state.modal.spindle_speed * RPM;
             state.push_event(ProgramEvent::Spindle(speed));
+            state.push_pause(state.options.spindle_time);
         }
         Ok(())
     }
@@ -198,6 +199,7 @@ impl Sinumerik {
         state.modal.tool = state.modal.selected_tool;
         self.modes.edge = 1;
         state.push_event(ProgramEvent::ToolChange(state.modal.tool));
+        state.push_pause(state.options.tool_change_time);
     }
 
     /// Returns the number of a tool by its name; a name that the table lacks gets a number of its own.
