@@ -31,6 +31,8 @@ const GAIN_STARTS: [f64; 3] = [1.4, 2.2, 3.3];
 const BANDWIDTH_STARTS: [f64; 2] = [180.0, 300.0];
 /// Residual with the gain of the machine file, relative to the least one, up to which it is kept.
 const KEPT: f64 = 1.1;
+/// The same for the cycle at which the signals are renewed.
+const RENEWED: f64 = 1.5;
 /// Starts of each gain that are followed to their minimum.
 const FOLLOWED: usize = 1;
 /// Gains whose minimum is followed with a free gain; the best one can be a local minimum.
@@ -325,7 +327,13 @@ impl LoopProblem<'_> {
         };
         let mut cycles: Vec<Nanoseconds> = match is_certain {
             true => vec![certain],
-            false => CYCLES.into_iter().chain([given.position]).filter(is_permitted).collect(),
+            false => self
+                .renewal(given)
+                .into_iter()
+                .chain(CYCLES)
+                .chain([given.position])
+                .filter(is_permitted)
+                .collect(),
         };
         if cycles.is_empty() {
             cycles.push(given.velocity);
@@ -338,6 +346,12 @@ impl LoopProblem<'_> {
             }
         });
         cycles.into_iter().map(|position| Periods { position, ..*given }).collect()
+    }
+
+    /// Returns the period at which the control renews its signals, rounded to velocity cycles, ns, if the recordings show it.
+    fn renewal(&self, given: &Periods) -> Option<Nanoseconds> {
+        let (signals, _) = self.recordings.iter().find(|(signals, _)| signals.is_renewal)?;
+        Some((signals.period / seconds(given.velocity)).round() as Nanoseconds * given.velocity)
     }
 
     /// Returns the RMS residual of the best start, m or rad, without further search.
@@ -434,8 +448,8 @@ impl LoopProblem<'_> {
         Some(fit)
     }
 
-    /// Returns the position cycle with the least residual and its minimum. Among cycles with about the same residual, that of
-    /// the machine file is preferred if it divides the lag, then the first one.
+    /// Returns the position cycle with the least residual and its minimum. Among cycles with about the same residual, the
+    /// renewal of the signals is preferred, then that of the machine file if it divides the lag, then the first one.
     ///
     /// A motion shows β + Tsp, so the others start with β changed by the difference of the cycles.
     fn best_cycle(
@@ -458,11 +472,19 @@ impl LoopProblem<'_> {
         let mut all: Vec<(Periods, Candidate)> = others.collect();
         all.push((*start, first.clone()));
         let least = all.iter().map(|(_, found)| found.cost).fold(f64::INFINITY, f64::min);
-        let close = all.into_iter().filter(|(_, found)| found.cost <= KEPT * KEPT * least);
+        let renewal = self.renewal(given);
+        let limit = |periods: &Periods| if Some(periods.position) == renewal { RENEWED } else { KEPT };
+        let close = all.into_iter().filter(|(periods, found)| found.cost <= limit(periods).powi(2) * least);
         let preference = |(periods, found): &(Periods, Candidate)| {
             let cycle = periods.position;
             let is_dividing = divides(cycle, found.values[0]);
-            (is_dividing && cycle == given.position, cycle == start.position, is_dividing, cycle)
+            (
+                Some(cycle) == self.renewal(given),
+                is_dividing && cycle == given.position,
+                cycle == start.position,
+                is_dividing,
+                cycle,
+            )
         };
         close.max_by_key(preference).unwrap_or((*start, first))
     }

@@ -19,10 +19,10 @@ use super::plant_regression::{CurrentRipple, PlantRegression, fit_plant};
 use super::recorded_feedforward::{fit_recorded_feedforward, recorded_feedforward};
 use super::refine::{RefinedParameter, RefinedValue, Refinement};
 use super::resample::interpolation_error;
-use super::setpoints::{longest_cycle, stride};
+use super::setpoints::{HELD, SetpointGrid, longest_cycle, stride};
 use super::trace_experiments::trace_experiments;
 use super::validate::constant_lag;
-use crate::recording::{Finding, Signals};
+use crate::recording::{Finding, SignalSpan, Signals};
 use virtual_axes_core::config::{AxisConfig, AxisKind, AxisUnits, Periods};
 use virtual_axes_core::statistics::mean;
 use virtual_axes_core::units::{
@@ -39,10 +39,15 @@ const GAIN_CHANGE: f64 = 0.15;
 const CLEAR: f64 = 1.5;
 /// Ratio of two residuals that explain a motion alike.
 const ALIKE: f64 = 1.1;
+/// Number of phases of the position cycle at which a control can log the current.
+const PHASES: usize = 8;
 /// Number of times that the plant is identified with the ripple of the loop.
 const PLANT_PASSES: usize = 2;
 /// Longest duration of motion of a recording that is simulated for delays and gains, s; all of it is compared at the end.
 const FITTED: f64 = 20.0;
+/// Part of the sampling period by which interpolated setpoints can move β and γ: they do not show where in a period the
+/// acceleration changes.
+const INTERPOLATED: f64 = 0.125;
 /// Standard errors of a value within its interval.
 const INTERVAL: f64 = 2.0;
 
@@ -70,7 +75,7 @@ pub(super) fn identify_production(
         ));
     }
     let has_current = signals.iter().any(|signals| signals.spans.iter().any(|span| span.current.is_some()));
-    let plant = fit_plant(&signals, &found.axis, None);
+    let plant = fit_plant(&signals, &found.axis, &[]);
     if let Some(plant) = &plant {
         apply_plant(plant, found);
     } else {
@@ -152,9 +157,9 @@ fn identify_loop(
     let before = found.axis.clone();
     for _ in 0..if has_plant { PLANT_PASSES } else { 0 } {
         found.axis = fit.axis.clone();
-        let ripple = simulated_ripple(&recordings, &fit);
+        let ripples = simulated_ripples(&recordings, &fit);
         let signals: Vec<&Signals> = recordings.iter().map(|(signals, _)| *signals).collect();
-        let Some(plant) = fit_plant(&signals, &found.axis, Some(&ripple)) else { break };
+        let Some(plant) = fit_plant(&signals, &found.axis, &ripples) else { break };
         apply_plant(&plant, found);
         found.current_ripple = plant.ripple;
         // The velocity loop keeps its bandwidth.
@@ -164,27 +169,65 @@ fn identify_loop(
             None => break,
         }
     }
-    apply_loop(&fit, &before, found);
+    let interpolated =
+        inputs.iter().filter(|input| is_interpolated(input.signals, seconds(fit.periods.position)));
+    let coarsest = interpolated.map(|input| input.signals.period).fold(0.0, f64::max);
+    apply_loop(&fit, (&before, INTERPOLATED * coarsest), found);
     report_interpolation(inputs, seconds(fit.periods.position), found);
 }
 
-/// Returns the ripple of the current at the samples: the simulated current of an instant minus the mean over a
-/// position cycle.
-fn simulated_ripple(recordings: &[(&Signals, FeedforwardMode)], fit: &LoopFit) -> CurrentRipple {
-    let of = |(k, (signals, mode)): (usize, &(&Signals, FeedforwardMode))| {
-        let mut ripple: Vec<Vec<f64>> =
-            signals.spans.iter().map(|span| vec![f64::NAN; span.position.len()]).collect();
-        for instant in trace_experiments(signals, k, &fit.periods, (*mode, 0.0, 1.0)) {
-            let mean = Experiment { ripple: 0.0, ..instant.clone() };
-            let simulated = [&instant, &mean].map(|experiment| simulate(&fit.axis, &fit.periods, experiment));
-            let [Ok(at), Ok(mean)] = simulated else { continue };
-            let difference = at.current.iter().zip(&mean.current).map(|(a, m)| a - m);
-            let to = ripple[instant.span].iter_mut().skip(instant.sample);
-            to.zip(difference).for_each(|(to, value)| *to = value);
-        }
-        ripple
+/// Returns the ripple of the current at the samples for some phases of the position cycle, its beginning first: the simulated
+/// current of an instant minus the mean over a cycle. The instants have that distance from the samples if the recording shows
+/// the position cycles; otherwise from the beginnings of the cycles, since a control logs at one phase of its cycles.
+fn simulated_ripples(recordings: &[(&Signals, FeedforwardMode)], fit: &LoopFit) -> Vec<CurrentRipple> {
+    let unknown = |signals: &Signals| -> Vec<Vec<f64>> {
+        signals.spans.iter().map(|span| vec![f64::NAN; span.position.len()]).collect()
     };
-    recordings.iter().enumerate().map(of).collect()
+    let unknown: CurrentRipple = recordings.iter().map(|(signals, _)| unknown(signals)).collect();
+    let mut ripples = vec![unknown; PHASES];
+    for (k, (signals, mode)) in recordings.iter().enumerate() {
+        for recorded in trace_experiments(signals, k, &fit.periods, (*mode, 0.0, 1.0)) {
+            let at = recorded.at_phases(PHASES);
+            let mean = Experiment { ripple: 0.0, ..at.clone() };
+            let simulated = [&at, &mean].map(|experiment| simulate(&fit.axis, &fit.periods, experiment));
+            let [Ok(instant), Ok(mean)] = simulated else { continue };
+            let ripple: Vec<f64> = instant.current.iter().zip(&mean.current).map(|(a, m)| a - m).collect();
+            let is_several =
+                shows_cycles(signals, &signals.spans[recorded.span], seconds(fit.periods.position));
+            for (phase, to) in ripples.iter_mut().enumerate() {
+                let to = to[k][recorded.span].iter_mut().skip(recorded.sample).take(recorded.position.len());
+                for (i, value) in to.enumerate() {
+                    let place = (recorded.first + i as f64 * recorded.period()) / at.period();
+                    let cycle = (place / PHASES as f64).floor();
+                    // Between two cycles of one phase the ripple is interpolated.
+                    let (from, step, part) = match is_several {
+                        true => (place.round() + phase as f64, 0, 0.0),
+                        false => {
+                            (cycle * PHASES as f64 + phase as f64, PHASES, place / PHASES as f64 - cycle)
+                        }
+                    };
+                    let (from, last) = (from.max(0.0) as usize, ripple.len().saturating_sub(1));
+                    if let (Some(a), Some(b)) =
+                        (ripple.get(from.min(last)), ripple.get((from + step).min(last)))
+                    {
+                        *value = a + part * (b - a);
+                    }
+                }
+            }
+        }
+    }
+    ripples
+}
+
+/// Returns true if setpoints of position cycles of `tsp` s are interpolated between the samples of PSEC.
+fn is_interpolated(signals: &Signals, tsp: f64) -> bool {
+    let mut spans = signals.spans.iter().filter(|span| span.psec.is_some());
+    stride(signals.period, tsp).is_none() && !spans.all(|span| shows_cycles(signals, span, tsp))
+}
+
+/// Returns true if the samples lie at several phases of position cycles of `tsp` s, which the setpoints show.
+fn shows_cycles(signals: &Signals, span: &SignalSpan, tsp: f64) -> bool {
+    signals.period < HELD * tsp && SetpointGrid::of(span, signals.period, tsp).is_some()
 }
 
 /// Returns the mean lag of the recordings behind PSEC, s, without that of the position loop.
@@ -278,7 +321,7 @@ fn moves(signals: &Signals) -> bool {
 /// Reports the error of the interpolated setpoints.
 fn report_interpolation(inputs: &[IdentificationInput<'_>], tsp: f64, found: &mut Identification) {
     let AxisUnits { error: unit, error_name: name, .. } = found.axis.units();
-    for input in inputs.iter().filter(|input| stride(input.signals.period, tsp).is_none()) {
+    for input in inputs.iter().filter(|input| is_interpolated(input.signals, tsp)) {
         let psec = input.signals.spans.iter().filter_map(|span| span.psec.as_deref());
         let error = psec.map(interpolation_error).fold(0.0, f64::max);
         found.findings.push(Finding::note(
@@ -361,8 +404,8 @@ fn report_ripple(inputs: &[IdentificationInput<'_>], periods: &Periods, found: &
     ));
 }
 
-/// Sets delays, gains and weights by the closed loop.
-fn apply_loop(fit: &LoopFit, before: &AxisConfig, found: &mut Identification) {
+/// Sets delays, gains and weights by the closed loop; β and γ have the additional `uncertainty`, s.
+fn apply_loop(fit: &LoopFit, (before, uncertainty): (&AxisConfig, f64), found: &mut Identification) {
     found.axis = fit.axis.clone();
     let of = |parameter: LoopParameter| fit.values.iter().find(|value| value.parameter == parameter);
     let tsp = seconds(fit.periods.position);
@@ -375,7 +418,7 @@ fn apply_loop(fit: &LoopFit, before: &AxisConfig, found: &mut Identification) {
     {
         if let Some(value) = of(parameter) {
             // β and γ act at velocity cycles only.
-            let half = INTERVAL * value.error + 0.5 * seconds(fit.periods.velocity);
+            let half = INTERVAL * value.error + 0.5 * seconds(fit.periods.velocity) + uncertainty;
             found.delays.push(delay(which, value.value - half, value.value + half, fit));
         }
     }

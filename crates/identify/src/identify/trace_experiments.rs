@@ -3,7 +3,7 @@
 use super::experiment::Experiment;
 use super::feedforward_mode::FeedforwardMode;
 use super::resample::BandLimitedSpline;
-use super::setpoints::SetpointGrid;
+use super::setpoints::{HELD, SetpointGrid};
 use crate::recording::Signals;
 use virtual_axes_core::config::Periods;
 use virtual_axes_core::units::seconds;
@@ -19,8 +19,6 @@ const SETTLING: f64 = 0.3;
 const ENDING: usize = 6;
 /// Shortest span that is simulated, s.
 const SHORTEST: f64 = 1.0;
-/// Sampling period relative to the position cycle below which the setpoints of the cycles are among the samples.
-const HELD: f64 = 0.9;
 
 /// Returns the spans of a recording as experiments with PSEC at the position cycles, `shift` s later than recorded: the
 /// setpoints themselves, if the recording shows each of them, otherwise interpolated. `ripple` is the share of the ripple of

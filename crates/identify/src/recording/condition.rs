@@ -135,7 +135,11 @@ pub fn condition(
     separate_spans(&mut spans, period);
     let trace_filter = select_trace_filter(&raw.name, options)?;
     let (name, torque_constant) = (raw.name.clone(), raw.torque_constant());
-    Ok((Signals { name, period, cutoff, trace_filter, torque_constant, current_lag, spans }, findings))
+    let is_renewal = renewed.is_some();
+    Ok((
+        Signals { name, period, is_renewal, cutoff, trace_filter, torque_constant, current_lag, spans },
+        findings,
+    ))
 }
 
 /// Moves PSEC forward in time and reports by how much.

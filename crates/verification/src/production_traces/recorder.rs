@@ -3,6 +3,7 @@
 use std::error::Error;
 use std::f64::consts::{PI, SQRT_2};
 
+use virtual_axes_core::config::Periods;
 use virtual_axes_core::machine::AxisSample;
 use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, seconds};
 use virtual_axes_identify::recording::RawRecording;
@@ -39,7 +40,8 @@ pub struct TraceRecorder {
     pub is_within_cycles: bool,
     /// Sampling of the current.
     pub current_sampling: CurrentSampling,
-    /// Number of sampling periods by which actual position, velocity and current are logged too late.
+    /// Number of sampling periods, or of position cycles if the signals are held, by which actual position, velocity and
+    /// current are logged too late.
     pub delay: usize,
     /// True if VFFWS and TFFWS are recorded.
     pub is_feedforward_recorded: bool,
@@ -107,11 +109,20 @@ impl TraceRecorder {
         }
     }
 
-    /// Returns the filtered values of a channel at the sampling instants, zero-order held, `delay` sampling periods late.
+    /// Returns the period at which a control with these periods renews its signals, ns.
+    pub fn renewal(&self, periods: &Periods) -> Nanoseconds {
+        match self.is_within_cycles {
+            true => self.sampling_period,
+            false => self.sampling_period.max(periods.position),
+        }
+    }
+
+    /// Returns the filtered values of a channel at the sampling instants, zero-order held, `delay` values late.
     fn filtered(&self, simulated: &SimulatedAxis, values: &[f64], delay: usize) -> Vec<f64> {
         let period = seconds(self.sampling_period);
         let count = (values.len() as f64 * simulated.period / period).round() as usize;
-        let index = |k: usize| ((k.saturating_sub(delay) as f64 * period + 1e-9) / simulated.period) as usize;
+        let index = |k: usize| ((k as f64 * period + 1e-9) / simulated.period) as usize;
+        let index = |k: usize| index(k).saturating_sub(delay);
         let held: Vec<f64> = (0..count).filter_map(|k| values.get(index(k)).copied()).collect();
         if self.cutoff > 0.0 { ButterworthFilter::new(self.cutoff, period).filter(&held) } else { held }
     }
@@ -171,11 +182,7 @@ impl HiddenAxis {
         recorder: &TraceRecorder,
         seed: u64,
     ) -> Result<RawRecording, Box<dyn Error>> {
-        let sampling = match recorder.is_within_cycles {
-            true => recorder.sampling_period,
-            false => recorder.sampling_period.max(self.periods.position),
-        };
-        let simulated = self.simulate(program, sampling)?;
+        let simulated = self.simulate(program, recorder.renewal(&self.periods))?;
         let setpoint = |of: fn(&AxisSample) -> f64| -> Vec<f64> {
             let values: Vec<f64> = simulated.samples.iter().map(of).collect();
             recorder.filtered(&simulated, &values, 0)

@@ -154,7 +154,7 @@ impl StudyFigures {
         });
         let cycle = summary.values.iter().find(|value| value.key == "periods.position_ms");
         let cycle = cycle.map_or(seconds(machine.periods().position), |value| value.value * MILLISECOND);
-        let delay = kind.logger_delay();
+        let delay = kind.logger_delay(hidden);
         self.lag = value("delays.alpha_ms").map(|found| {
             let lag = (found.value * MILLISECOND / cycle - 1e-6).ceil() * cycle;
             (lag - hidden.lag() - delay) / seconds(hidden.periods.position)

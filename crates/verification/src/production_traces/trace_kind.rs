@@ -54,7 +54,7 @@ impl TraceKind {
     ///
     /// A third of the kinds are one to three rapids, the others part programs of 6 to 20 s. A third has no torque
     /// feedforward, half have recorded feedforward signals. The current is averaged, or sampled at an instant of the
-    /// sampling period. Some traces are filtered, the others are not. Actual values are logged up to two samples late.
+    /// sampling period. Some traces are filtered, the others are not. Actual values are logged up to two renewals late.
     pub fn draw(seed: u64, period: Nanoseconds) -> Self {
         let mut random = RandomSource::new(seed, stream::TRACE_KIND);
         let program = match random.below(3) {
@@ -112,8 +112,8 @@ impl TraceKind {
         }
     }
 
-    /// Returns the time by which actual values are logged too late, s.
-    pub fn logger_delay(&self) -> f64 {
-        seconds(self.recorder.delay as Nanoseconds * self.recorder.sampling_period)
+    /// Returns the time by which actual values of `axis` are logged too late, s.
+    pub fn logger_delay(&self, axis: &HiddenAxis) -> f64 {
+        seconds(self.recorder.delay as Nanoseconds * self.recorder.renewal(&axis.periods))
     }
 }
