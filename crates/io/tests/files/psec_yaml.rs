@@ -188,7 +188,7 @@ fn errors_of_unknown_files_list_the_supported_kinds() {
         (b"t,x\n0,0\n", "f: the first line is \"t,x\"; supported are setpoints as CSV"),
         (b"foo: 1\nbar: [2]\n", "f: the file is a mapping with keys foo, bar; supported are"),
         (b"- 1\n", "f: the first line is \"- 1\"; supported are"),
-        (b"\x89PNG\r\n\x1a\n\0\0\0", "f: the file is not UTF-8 text; supported are"),
+        (b"\x89PNG\r\n\x1a\n\0\0\0", "f: the file is binary, must be text; supported are"),
         (b"moves: {x: 1\n", "f:1: invalid YAML: "),
     ] {
         let path = folder.file("f", bytes);
