@@ -30,7 +30,14 @@ pub(super) struct Lines<R> {
 
 impl<R: Read> Lines<R> {
     pub fn new(input: R) -> Self {
-        Lines { input: TextReader::new(input), buffer: vec![0; BUFFER_BYTES], begin: 0, end: 0, number: 0, ended: false }
+        Lines {
+            input: TextReader::new(input),
+            buffer: vec![0; BUFFER_BYTES],
+            begin: 0,
+            end: 0,
+            number: 0,
+            ended: false,
+        }
     }
 
     /// Returns the next line that is not blank, without its line break, and its number from 1. Lines of white

@@ -2,6 +2,7 @@
 
 mod bounded_recording;
 mod encodings;
+mod output;
 mod psec_csv;
 mod psec_mcap;
 mod psec_yaml;

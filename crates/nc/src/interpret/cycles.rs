@@ -2,6 +2,8 @@
 
 use virtual_axes_core::units::MILLIMETER;
 
+use virtual_axes_core::units::Rounded;
+
 use super::codes::{FeedMode, Motion, ReturnLevel, g_name};
 use super::dialect::Dialect;
 use super::error::Outcome;
@@ -54,7 +56,10 @@ impl State {
         let strokes = f64::from(repeats) * pecks.count;
         if strokes > MAX_PECKS {
             let what = if cycle.peck.is_some() { "pecks" } else { "repetitions" };
-            return Err(format!("{name}: {strokes} {what} in one line; at most {MAX_PECKS} are allowed"));
+            return Err(format!(
+                "{name}: {} {what} in one line; at most {MAX_PECKS} are allowed",
+                Rounded(strokes)
+            ));
         }
         let (start, target) = (self.programmed(), self.targets(block)?);
         self.modal.cycle = Some(cycle);

@@ -32,8 +32,7 @@ const MAX_SIGNALS: usize = 10_000;
 
 /// Returns true if a text file that begins with `head` has the format.
 pub(super) fn detects(head: &str) -> bool {
-    head.trim_start().starts_with('{')
-        && head.contains(&format!("\"{SIGNALS}\""))
+    head.trim_start().starts_with('{') && head.contains(&format!("\"{SIGNALS}\""))
 }
 
 /// Lists the columns with their detected meanings. `name` is the name of the file.
