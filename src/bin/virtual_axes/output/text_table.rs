@@ -10,6 +10,8 @@ pub const WIDTH: u16 = 80;
 const GAPS: [u16; 2] = [2, 1];
 /// Width of a column of text that is worth a smaller gap.
 const TEXT: u16 = 16;
+/// Length from which a word is divided anywhere.
+const WORD: u16 = 24;
 /// Length of a word of a heading from which it is divided behind a hyphen.
 const LONG_WORD: usize = 12;
 
@@ -107,7 +109,7 @@ fn longest_word(table: &Table, index: usize) -> u16 {
     let heading = table.columns.get(index).map(heading).unwrap_or_default();
     let cells = table.rows.iter().filter_map(|row| row.get(index)).map(String::as_str);
     let figures = cells.clone().filter(|cell| cell.chars().count() <= FIGURE);
-    longest(figures.chain(cells.chain([heading.as_str()]).flat_map(str::split_whitespace)))
+    longest(figures.chain(cells.chain([heading.as_str()]).flat_map(str::split_whitespace))).min(WORD)
 }
 
 /// Returns the length of the heading of a column on one line.
