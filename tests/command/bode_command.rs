@@ -27,7 +27,7 @@ fn table_has_every_loop_of_every_axis() {
         }
     }
     assert!(!table.contains("antiresonance"), "{table}");
-    assert!(table.lines().all(|line| line.chars().count() <= 100), "{table}");
+    assert!(table.lines().all(|line| line.chars().count() <= 80), "{table}");
     let quiet = printed(&["bode", "--quiet"]);
     assert_eq!(table.lines().next(), Some(quiet.trim_end()));
 }

@@ -8,10 +8,10 @@ use virtual_axes_core::config::{ControllerName, DEFINITIONS, listing};
 use virtual_axes_core::trajectory::RejectionCode;
 
 #[test]
-fn lists_fit_in_100_columns() {
+fn lists_fit_in_80_columns() {
     for command in ["interface", "parameters"] {
         for line in printed(&[command]).lines() {
-            assert!(line.chars().count() <= 100, "{command}: {line}");
+            assert!(line.chars().count() <= 80, "{command}: {line}");
         }
     }
 }

@@ -8,6 +8,7 @@ mod command_design;
 mod examples;
 mod files_output;
 mod hints;
+mod hostile_input;
 mod identify_command;
 mod identify_elastic;
 mod identify_next;

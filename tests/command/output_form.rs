@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
 /// Largest length of a line, characters.
-const WIDTH: usize = 100;
+const WIDTH: usize = 80;
 
 fn run(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_virtual_axes")).args(arguments).output().expect("the command starts")
@@ -36,7 +36,7 @@ fn assert_fits(arguments: &[&str]) {
 }
 
 #[test]
-fn tables_fit_a_terminal_of_100_columns() {
+fn tables_fit_a_terminal_of_80_columns() {
     for (scenario, _) in virtual_axes_builtin::SCENARIOS {
         assert_fits(&["run", scenario]);
     }
@@ -48,6 +48,10 @@ fn tables_fit_a_terminal_of_100_columns() {
     assert_fits(&["tune", "corner-90", "--controller", "cascade"]);
     assert_fits(&["tune", "x-constant", "--controller", "gpc"]);
     assert_fits(&["design", "gpc"]);
+    assert_fits(&["bode"]);
+    assert_fits(&["learn", "corner-90", "--iterations", "1"]);
+    assert_fits(&["run", "pocket"]);
+    assert_fits(&["check", "pocket"]);
     for list in ["scenarios", "machines", "parameters", "interface"] {
         assert_fits(&[list]);
     }

@@ -40,7 +40,7 @@
 //!
 //! | layer | modules |
 //! |---|---|
-//! | basis | [`units`]: units and integer time; [`named_values!`]: enumerations with names; [`text`], [`yaml`]: messages and files; [`simd`]: SIMD arithmetic over axes; [`statistics`]; [`state_codec`]: states as bytes |
+//! | basis | [`units`]: units and integer time; [`named_values!`]: enumerations with names; [`text`], [`encoding`], [`yaml`]: messages and files; [`simd`]: SIMD arithmetic over axes; [`statistics`]; [`state_codec`]: states as bytes |
 //! | configuration | [`config`]: parameter schema, machine files, [`config::MachineConfig`] |
 //! | models | [`kinematics`]: tool pose and joints; [`drive`]: motor, friction and gravity; [`control`]: cascade, RST and feedforward; [`design`]: predictive control (GPC), PID, pole placement, stability margins |
 //! | machine | [`machine`]: all axes, advanced by position cycles |
@@ -55,6 +55,7 @@ pub mod config;
 pub mod control;
 pub mod design;
 pub mod drive;
+pub mod encoding;
 pub mod kinematics;
 pub mod machine;
 mod named_values;

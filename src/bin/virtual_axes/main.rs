@@ -27,7 +27,7 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::error::ContextKind;
+use clap::error::{ContextKind, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::{CompleteEnv, Shell};
 use virtual_axes_core::config::listing;
@@ -35,7 +35,7 @@ use virtual_axes_core::text::is_control;
 
 use crate::arguments::output_arguments::OutputFormat;
 use crate::list::completion;
-use crate::output::{emphasis, interrupt, print_error};
+use crate::output::{emphasis, interrupt, print_error, with_escaped_arguments, with_shown_arguments};
 
 /// Exit status of `check` if setpoints are beyond a limit.
 const BEYOND_LIMITS: u8 = 1;
@@ -43,6 +43,13 @@ const BEYOND_LIMITS: u8 = 1;
 const BAD_INPUT: u8 = 2;
 /// Exit status of a command whose result must not be used.
 const INVALID_RESULT: u8 = 3;
+/// Errors of the standard library about a number, and what is required instead.
+const NUMBER_ERRORS: [(&str, &str); 4] = [
+    ("invalid float literal", "must be a number, for example 2.5"),
+    ("cannot parse float from empty string", "must be a number, for example 2.5"),
+    ("invalid digit found in string", "must be a whole number of at least 0"),
+    ("cannot parse integer from empty string", "must be a whole number of at least 0"),
+];
 
 /// Simulate virtual machine-tool axes offline.
 #[derive(Debug, Parser)]
@@ -163,13 +170,19 @@ fn main() -> ExitCode {
             return ExitCode::from(if interrupt::is_raised() { interrupt::INTERRUPTED } else { BAD_INPUT });
         }
     };
-    match io::stdout().write_all(text.as_bytes()).and_then(|()| io::stdout().flush()) {
+    let text = with_escaped_arguments(text);
+    ExitCode::from(status(io::stdout().write_all(text.as_bytes()).and_then(|()| io::stdout().flush())))
+}
+
+/// Returns the exit status after the output is written, and prints the error if it is not.
+fn status(written: io::Result<()>) -> u8 {
+    match written {
         // A closed pipe (`| head`) is no error.
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             print_error(&format!("standard output: {error}"));
-            ExitCode::from(BAD_INPUT)
+            BAD_INPUT
         }
-        _ => ExitCode::SUCCESS,
+        _ => 0,
     }
 }
 
@@ -180,8 +193,20 @@ fn command_line() -> CommandLine {
         if error.render().to_string().contains("as a value, use '-- --") {
             error.remove(ContextKind::Suggested);
         }
-        let text = error.render().to_string();
-        if error.use_stderr() && text.chars().any(|c| c != '\n' && is_control(c)) {
+        if !error.use_stderr() {
+            let written = error.print().and_then(|()| io::stdout().flush());
+            std::process::exit(i32::from(status(written)));
+        }
+        if error.kind() == ErrorKind::InvalidUtf8
+            && let Some(argument) = std::env::args_os().find(|argument| argument.to_str().is_none())
+        {
+            print_error(&format!("argument {argument:?} is not UTF-8; rename the file"));
+            std::process::exit(i32::from(BAD_INPUT));
+        }
+        let found = error.render().to_string();
+        let text =
+            NUMBER_ERRORS.iter().fold(found.clone(), |text, (found, remedy)| text.replace(found, remedy));
+        if with_shown_arguments(text.clone()) != found || text.chars().any(|c| c != '\n' && is_control(c)) {
             print_error(text.trim_end());
             std::process::exit(i32::from(BAD_INPUT));
         }

@@ -94,7 +94,7 @@ pub fn text() -> String {
         let live = if live == "yes" { ", live" } else { "" };
         let _ = writeln!(out, "{key}");
         let _ = writeln!(out, "    {range}; {default}{live}; {owner}");
-        for line in wrapped(&description, 96) {
+        for line in wrapped(&description, 76) {
             let _ = writeln!(out, "    {line}");
         }
     }

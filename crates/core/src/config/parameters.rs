@@ -16,6 +16,7 @@ use super::machine::MachineConfig;
 use super::node::{self, NodeConfig, QosConfig};
 use super::parameter_file::{self, Assignment, parse_assignment};
 use super::value::Value;
+use crate::encoding::decode_text;
 use crate::text::{BuiltinFiles, builtin_names, builtin_text, nearest_hint, nearest_name, shortened};
 
 /// Name of the default machine, the Mikron UCP 710.
@@ -389,8 +390,5 @@ fn read_text(path: &Path) -> Result<String, ConfigError> {
     if bytes.len() as u64 > MAX_FILE_BYTES {
         return Err(unreadable(format!("file is larger than {MAX_FILE_BYTES} bytes")));
     }
-    String::from_utf8(bytes).map_err(|error| {
-        let position = error.utf8_error().valid_up_to();
-        unreadable(format!("invalid UTF-8 at byte {position}"))
-    })
+    decode_text(&bytes).map_err(unreadable)
 }

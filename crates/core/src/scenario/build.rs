@@ -292,10 +292,14 @@ fn check_time(at: &str, key: &str, value: f64) -> Result<(), ScenarioError> {
     Err(ScenarioError::value(at, key, value, &format!("lie in 0 … {MAX_DURATION} s")))
 }
 
+/// Largest feed, m/min or rpm, and largest limit of a path, in the units of its key.
+const MAX_FEED: f64 = 1e6;
+const MAX_LIMIT: f64 = 1e9;
+
 fn feed_of(at: &str, key: &str, value: Option<YamlNumber>, unit: f64) -> Result<Option<f64>, ScenarioError> {
     match value {
-        Some(YamlNumber(feed)) if !(feed > 0.0 && feed.is_finite()) => {
-            Err(ScenarioError::value(at, key, feed, "be a finite number above 0"))
+        Some(YamlNumber(feed)) if !(feed > 0.0 && feed <= MAX_FEED) => {
+            Err(ScenarioError::value(at, key, feed, &format!("be above 0 and at most {MAX_FEED:e}")))
         }
         feed => Ok(feed.map(|YamlNumber(feed)| feed * unit)),
     }
@@ -333,8 +337,9 @@ fn path_limits(values: &KeyedNumbers, at: &str) -> Result<[PathLimits; 2], Scena
                           acceleration_rev_s2 and jerk_rev_s3 for rotary paths";
             return Err(ScenarioError::key(at, key, reason));
         };
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(ScenarioError::value(at, key, value, "be a finite number above 0"));
+        if !(value > 0.0 && value <= MAX_LIMIT) {
+            let allowed = format!("be above 0 and at most {MAX_LIMIT:e}");
+            return Err(ScenarioError::value(at, key, value, &allowed));
         }
         let limits = &mut limits[kind as usize];
         *(if is_jerk { &mut limits.jerk } else { &mut limits.acceleration }) = value * unit;

@@ -22,8 +22,9 @@ mod file;
 use std::path::Path as FilePath;
 
 use crate::config::MachineConfig;
+use crate::encoding::decode_text;
 use crate::path::Program;
-use crate::text::{BuiltinFiles, builtin_names, builtin_text, nearest_name};
+use crate::text::{BuiltinFiles, builtin_names, builtin_text, escaped, nearest_name};
 use crate::yaml;
 
 pub use error::ScenarioError;
@@ -64,7 +65,8 @@ impl Scenario {
                 &format!("size is {length} bytes, at most {MAX_FILE_BYTES} are allowed"),
             ));
         }
-        Self::from_yaml(&std::fs::read_to_string(name).map_err(failed)?, name)
+        let text = decode_text(&std::fs::read(name).map_err(failed)?);
+        Self::from_yaml(&text.map_err(|reason| unknown(name, builtin, &reason))?, name)
     }
 
     /// Parses the text of a scenario file; messages name it `name`.
@@ -116,7 +118,7 @@ fn neighbors(name: &str) -> Vec<String> {
     let Ok(entries) = std::fs::read_dir(directory) else { return Vec::new() };
     let files =
         entries.take(MOST).flatten().filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_file()));
-    files.map(|entry| parent.join(entry.file_name()).to_string_lossy().into_owned()).collect()
+    files.map(|entry| escaped(&parent.join(entry.file_name()).to_string_lossy())).collect()
 }
 
 /// Returns true if a name has the extension of a file, as no built-in name has.
@@ -127,7 +129,8 @@ pub fn is_file_name(name: &str) -> bool {
 /// Returns the file beside `name` that differs only in its extension, or the most similar name among these files and
 /// `builtin`.
 pub fn nearest_input<'a>(name: &str, builtin: impl Iterator<Item = &'a str>) -> Option<String> {
-    let files = neighbors(name);
+    let mut files = neighbors(name);
+    files.retain(|file| file != name);
     let stem = FilePath::new(name).file_stem();
     let same = files.iter().find(|file| FilePath::new(file).file_stem() == stem);
     same.cloned().or_else(|| nearest_name(name, builtin.map(str::to_owned).chain(files.iter().cloned())))

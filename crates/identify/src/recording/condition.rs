@@ -19,6 +19,8 @@ use virtual_axes_core::units::{MILLISECOND, Rounded, seconds};
 /// Error of a recording without position.
 const NO_POSITION: &str =
     "no position was recorded, or none of its values is a number; name its column by position=COLUMN[UNIT]";
+/// Largest stamp of a recording, s; times since 1970 or 1601 are below.
+const LATEST: f64 = 1e11;
 /// Fewest samples of a span, independent of the filter length.
 const SHORTEST_SPAN: usize = 16;
 /// Shortest permitted length of the longest span, in standard deviations of the filter.
@@ -189,6 +191,13 @@ fn check_lengths(raw: &RawRecording) -> Result<(), ConditioningError> {
             NAMES[n],
             values.len(),
             raw.time.len()
+        );
+        return Err(ConditioningError::new(&raw.name, reason));
+    }
+    if let Some(time) = raw.time.iter().find(|time| time.abs() > LATEST) {
+        let reason = format!(
+            "a stamp is {} s, must lie in ±{LATEST:e} s; check column and unit of the time",
+            Rounded(*time)
         );
         return Err(ConditioningError::new(&raw.name, reason));
     }

@@ -572,6 +572,20 @@ fn degrees_are_reported_on_a_rotary_axis() {
 }
 
 #[test]
+fn stamps_beyond_any_clock_are_rejected() {
+    for (stamp, found) in [(1e305, "1e305"), (-2e11, "-200000000000"), (f64::INFINITY, "inf")] {
+        let mut raw = recording();
+        raw.time[7] = stamp;
+        let message = fault(&raw).to_string();
+        assert!(message.contains(&format!("a stamp is {found} s, must lie in ±1e11 s")), "{message}");
+    }
+    // Seconds since 1601.
+    let mut raw = recording();
+    raw.time.iter_mut().for_each(|time| *time += 1.3e10);
+    assert!(!run(&raw).0.spans.is_empty());
+}
+
+#[test]
 fn swapped_columns_are_reported() {
     let good = recording();
     let mut raw = good.clone();

@@ -413,7 +413,6 @@ fn the_front_contains_the_pareto_optimal_candidates() {
 #[test]
 fn the_cost_of_a_tuning_is_the_error_of_the_cuts() {
     let parameters = machine(&["x", "y"]);
-    let config = parameters.machine_config().expect("a machine");
     // Legs at rest at both ends, by the cosine law: end, position cycles, rapid traverse.
     let legs: [([f64; 2], usize, bool); 6] = [
         ([8e-3, 0.0], 30, true),

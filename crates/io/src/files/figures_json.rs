@@ -94,7 +94,10 @@ pub fn part_program_json(figures: &ProgramFigures) -> Value {
             "time_s": worst.time,
         })
     };
-    let energy_line = |one: &LineEnergy| json!({ "line": one.line, "text": one.text, "energy": program_energy(&one.energy) });
+    let energy_line = |one: &LineEnergy| {
+        let energy = program_energy(&one.energy);
+        json!({ "line": one.line, "text": one.text, "energy": energy })
+    };
     let errors = |errors: ProgrammedErrors| {
         json!({
             "max": errors.max / MICROMETER,

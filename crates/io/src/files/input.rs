@@ -9,6 +9,7 @@ use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Vis
 
 use super::lines::fields;
 use super::psec_error::{TIME, header_unit_hint};
+use virtual_axes_core::encoding::{decode, decode_text};
 use virtual_axes_core::text::shortened;
 use virtual_axes_core::yaml;
 
@@ -69,6 +70,8 @@ pub enum InputError {
 pub struct Input {
     name: String,
     kind: FileKind,
+    /// Text of a YAML file.
+    text: Option<String>,
     head: Vec<u8>,
     file: File,
 }
@@ -90,14 +93,17 @@ impl Input {
         let mut file = File::open(path).map_err(unreadable)?;
         let mut head = Vec::new();
         (&mut file).take(HEAD_BYTES).read_to_end(&mut head).map_err(unreadable)?;
-        let kind = match kind_from_head(&head) {
-            Some(kind) => kind,
-            None => {
-                (&mut file).take(MAX_YAML_BYTES - HEAD_BYTES).read_to_end(&mut head).map_err(unreadable)?;
-                kind_from_yaml(&head, &name)?
-            }
-        };
-        Ok(Input { name, kind, head, file })
+        if let Some(kind) = kind_from_head(&head) {
+            return Ok(Input { name, kind, text: None, head, file });
+        }
+        (&mut file).take(MAX_YAML_BYTES - HEAD_BYTES).read_to_end(&mut head).map_err(unreadable)?;
+        let unknown = |found: String| InputError::Unknown { at: name.clone(), found };
+        if head.len() as u64 >= MAX_YAML_BYTES {
+            return Err(unknown(format!("the file is longer than {MAX_YAML_BYTES} bytes")));
+        }
+        let text = decode_text(&head).map_err(unknown)?;
+        let kind = kind_from_yaml(&text, &name)?;
+        Ok(Input { name, kind, text: Some(text), head, file })
     }
 
     /// Returns the kind of the file.
@@ -112,10 +118,7 @@ impl Input {
 
     /// Returns the text of a YAML file.
     pub fn text(&self) -> Option<&str> {
-        match self.kind {
-            FileKind::PsecCsv | FileKind::Mcap => None,
-            FileKind::PsecYaml | FileKind::Machine | FileKind::Scenario => str::from_utf8(&self.head).ok(),
-        }
+        self.text.as_deref()
     }
 
     /// Returns a reader of the whole content.
@@ -128,25 +131,18 @@ pub(super) fn kind_from_head(head: &[u8]) -> Option<FileKind> {
     if head.starts_with(mcap::MAGIC) {
         return Some(FileKind::Mcap);
     }
-    let text = String::from_utf8_lossy(head);
+    let text = decode(head);
     let line = first_line(&text);
     (line.contains(',') && fields(line).next() == Some(TIME)).then_some(FileKind::PsecCsv)
 }
 
 /// Returns the first line that is not blank.
 fn first_line(text: &str) -> &str {
-    let text = text.trim_start_matches('\u{feff}').trim_start();
-    text.lines().next().unwrap_or_default().trim_end()
+    text.trim_start().lines().next().unwrap_or_default().trim_end()
 }
 
-fn kind_from_yaml(bytes: &[u8], name: &str) -> Result<FileKind, InputError> {
+fn kind_from_yaml(text: &str, name: &str) -> Result<FileKind, InputError> {
     let unknown = |found: String| InputError::Unknown { at: name.to_owned(), found };
-    if bytes.len() as u64 >= MAX_YAML_BYTES {
-        return Err(unknown(format!("the file is longer than {} bytes", MAX_YAML_BYTES)));
-    }
-    let Ok(text) = str::from_utf8(bytes) else {
-        return Err(unknown("the file is not UTF-8 text".to_owned()));
-    };
     let documents: Vec<YamlOutline> = yaml::documents(text).map_err(|error| InputError::Syntax {
         at: error.position(name),
         is_first_line: error.line <= 1,

@@ -3,20 +3,21 @@
 use std::io::{ErrorKind, Read};
 
 use memchr::memchr;
+use virtual_axes_core::encoding::TextReader;
 
 /// Maximum length of a line, bytes.
 const MAX_LINE_BYTES: usize = 1 << 16;
 /// Size of the read buffer, bytes: few system calls, and within the processor cache.
 const BUFFER_BYTES: usize = 4 * MAX_LINE_BYTES;
-/// Byte order mark in front of a UTF-8 text.
+/// Byte order mark within a text, as of joined files.
 const BYTE_ORDER_MARK: char = '\u{feff}';
 /// Error message for bytes that are not UTF-8.
 const NOT_UTF8: &str = "stream did not contain valid UTF-8";
 
-/// Reader of the lines that are not blank, with their numbers.
+/// Reader of the lines of a text in any encoding that are not blank, with their numbers.
 #[derive(Debug)]
 pub(super) struct Lines<R> {
-    input: R,
+    input: TextReader<R>,
     buffer: Vec<u8>,
     /// Start of the next line in `buffer`.
     begin: usize,
@@ -29,14 +30,21 @@ pub(super) struct Lines<R> {
 
 impl<R: Read> Lines<R> {
     pub fn new(input: R) -> Self {
-        Lines { input, buffer: vec![0; BUFFER_BYTES], begin: 0, end: 0, number: 0, ended: false }
+        Lines {
+            input: TextReader::new(input),
+            buffer: vec![0; BUFFER_BYTES],
+            begin: 0,
+            end: 0,
+            number: 0,
+            ended: false,
+        }
     }
 
     /// Returns the next line that is not blank, without its line break, and its number from 1. Lines of white
     /// space are blank.
     ///
     /// # Errors
-    /// Returns the line number and the reason if the line is too long, not UTF-8 or cannot be read.
+    /// Returns the line number and the reason if the line is too long or cannot be read.
     pub fn next(&mut self) -> Result<Option<(u64, &str)>, (u64, String)> {
         loop {
             self.number += 1;
@@ -59,7 +67,6 @@ impl<R: Read> Lines<R> {
             self.ended = bare < length;
             let text = str::from_utf8(&self.buffer[begin..begin + bare])
                 .map_err(|_| (number, NOT_UTF8.to_owned()))?;
-            let text = if number == 1 { text.trim_start_matches(BYTE_ORDER_MARK) } else { text };
             return Ok(Some((number, text)));
         }
     }

@@ -128,20 +128,77 @@ fn resolve_links(path: &Path) -> PathBuf {
     path
 }
 
-/// Creates a temporary file in the folder of `target`, with a name unique to this process.
+/// Creates a temporary file in the folder of `target`, with a name unique to this process, and removes those that killed
+/// processes left. A lock on the file states that it is in use.
 fn create_temporary(target: &Path) -> io::Result<(File, PathBuf)> {
     let name = target.file_name().unwrap_or_default().to_string_lossy();
+    remove_abandoned(target, &name);
     let mut tried = 0;
     loop {
         let partial = target.with_file_name(format!(".{name}.{}.{tried}.partial", std::process::id()));
         tried += 1;
         match File::options().write(true).create_new(true).open(&partial) {
             Err(error) if error.kind() == ErrorKind::AlreadyExists && tried < MAX_NAMES => {}
-            opened => return opened.map(|file| (file, partial)),
+            opened => {
+                return opened.map(|file| {
+                    // Without locks, the process states that the file is in use.
+                    let _ = file.try_lock();
+                    (file, partial)
+                });
+            }
         }
     }
 }
 
+/// Removes temporary files of `target` whose processes have ended; a failure is ignored.
+fn remove_abandoned(target: &Path, name: &str) {
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let Some(process) = entry.file_name().to_str().and_then(|file| process_of(file, name)) else {
+            continue;
+        };
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        let is_free = || File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok());
+        if is_file && has_ended(process) && is_free() {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// Returns the process of a temporary file of the output `name`, `.NAME.PROCESS.NUMBER.partial`.
+fn process_of(file: &str, name: &str) -> Option<u32> {
+    let numbers = file.strip_prefix('.')?.strip_prefix(name)?.strip_prefix('.')?.strip_suffix(".partial")?;
+    let (process, number) = numbers.split_once('.')?;
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    (is_number(process) && is_number(number)).then(|| process.parse().ok())?
+}
+
+/// Returns true if a process has ended, or is this one, which locks its files; false where that is unknown.
+fn has_ended(process: u32) -> bool {
+    process == std::process::id()
+        || (Path::new("/proc/self").exists() && !Path::new(&format!("/proc/{process}")).exists())
+}
+
 fn with_file_name(name: &str, error: &io::Error) -> io::Error {
     io::Error::new(error.kind(), format!("{name}: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_process_of_a_temporary_file_is_in_its_name() {
+        assert_eq!(process_of(".a.csv.812.0.partial", "a.csv"), Some(812));
+        for other in [
+            "a.csv.812.0.partial",
+            ".b.csv.812.0.partial",
+            ".a.csv.812.partial",
+            ".a.csv.8x.0.partial",
+            ".a.csv.x.812.0.partial",
+            ".a.csv.812.0.partial.csv",
+        ] {
+            assert_eq!(process_of(other, "a.csv"), None, "{other}");
+        }
+    }
 }

@@ -1,18 +1,37 @@
 //! Hints of errors of position setpoints from CSV.
 
-use virtual_axes_core::trajectory::{Rejection, RejectionCode, TrajectoryRequest};
-use virtual_axes_core::units::seconds;
+use crate::messages::trajectory_msgs::msg::JointTrajectory;
+use virtual_axes_core::trajectory::{Rejection, RejectionCode};
+use virtual_axes_core::units::Rounded;
 
 /// Header of the time column.
 pub(super) const TIME: &str = "time";
 /// Maximum time, s: 100 h, as of part programs.
 pub(super) const MAX_TIME: f64 = 360_000.0;
+/// Largest magnitude of a value of a point, in SI units: beyond that of any axis.
+const MAX_VALUE: f64 = 1e9;
 
-/// Returns the index of the first point after [`MAX_TIME`], with the reason of its rejection.
-pub(super) fn late_point(request: &TrajectoryRequest) -> Option<(usize, String)> {
-    let mut times = (0..request.points()).filter_map(|index| Some((index, seconds(request.point(index)?.0))));
-    let (index, time) = times.find(|&(_, time)| time > MAX_TIME)?;
-    Some((index, format!("point {index}: time_from_start is {time} s, must be at most {MAX_TIME} s (100 h)")))
+/// Returns the index of the first point after [`MAX_TIME`] or with a value beyond [`MAX_VALUE`], with the reason of its
+/// rejection.
+pub(super) fn extreme_point(message: &JointTrajectory) -> Option<(usize, String)> {
+    message.points.iter().enumerate().find_map(|(index, point)| {
+        let time = point.time_from_start.sec;
+        if f64::from(time) > MAX_TIME {
+            let reason = format!("time_from_start is {time} s, must be at most {MAX_TIME} s (100 h)");
+            return Some((index, format!("point {index}: {reason}")));
+        }
+        let fields = [
+            ("positions", &point.positions),
+            ("velocities", &point.velocities),
+            ("accelerations", &point.accelerations),
+            ("effort", &point.effort),
+        ];
+        fields.into_iter().find_map(|(field, values)| {
+            let value = values.iter().find(|value| value.is_finite() && value.abs() > MAX_VALUE)?;
+            let reason = format!("{} in {field}, must lie in ±{MAX_VALUE:e}", Rounded(*value));
+            Some((index, format!("point {index}: {reason} (m or rad, and s)")))
+        })
+    })
 }
 
 /// Returns the probable cause of a setpoint far beyond a limit: another unit. Else an empty text.

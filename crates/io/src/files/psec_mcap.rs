@@ -13,7 +13,7 @@ use super::mcap_messages::Messages;
 use super::mcap_reader::{
     Completeness, check_chunks, damaged, decode, parse_error, read_messages, type_of, unfinished_error,
 };
-use super::psec_error::late_point;
+use super::psec_error::extreme_point;
 use crate::messages;
 use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 use virtual_axes_core::trajectory::TrajectoryRequest;
@@ -176,12 +176,12 @@ impl<R: Read + Seek> McapTrajectories<R> {
             )
         };
         let trajectory = decode(message).map_err(|reason| FileError::new(at(), reason))?;
+        if let Some((_, reason)) = extreme_point(&trajectory) {
+            return Err(FileError::new(at(), reason));
+        }
         let request = messages::request(&trajectory, usize::MAX)
             .map_err(|rejection| FileError::new(at(), rejection))?;
-        match late_point(&request) {
-            Some((_, reason)) => Err(FileError::new(at(), reason)),
-            None => Ok((log_time, request)),
-        }
+        Ok((log_time, request))
     }
 }
 

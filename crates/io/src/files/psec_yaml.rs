@@ -10,12 +10,13 @@ use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde_saphyr::Spanned;
 
 use super::error::FileError;
-use super::psec_error::late_point;
+use super::psec_error::extreme_point;
 use crate::messages::builtin_interfaces::msg::{Duration, Time};
 use crate::messages::std_msgs::msg::Header;
 use crate::messages::trajectory_msgs::msg::{JointTrajectory, JointTrajectoryPoint};
 use crate::messages::{self};
 use virtual_axes_core::trajectory::TrajectoryRequest;
+use virtual_axes_core::units::Rounded;
 use virtual_axes_core::yaml::{self, YamlNumber};
 
 /// Placeholder of `ros2 topic echo` for omitted values.
@@ -50,12 +51,11 @@ pub fn read_psec_yaml(text: &str, file: &str) -> Result<Vec<TrajectoryRequest>, 
                 let line = index.and_then(|index| lines.get(index).copied());
                 yaml::position(file, line.unwrap_or(begin))
             };
-            let request = messages::request(&message, usize::MAX)
-                .map_err(|rejection| FileError::new(at(rejection.index), rejection))?;
-            match late_point(&request) {
-                Some((index, reason)) => Err(FileError::new(at(Some(index)), reason)),
-                None => Ok(request),
+            if let Some((index, reason)) = extreme_point(&message) {
+                return Err(FileError::new(at(Some(index)), reason));
             }
+            messages::request(&message, usize::MAX)
+                .map_err(|rejection| FileError::new(at(rejection.index), rejection))
         })
         .collect()
 }
@@ -122,6 +122,10 @@ impl<T: TryFrom<i128> + Bounded> Visitor<'_> for WholeVisitor<T> {
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "an integer from {} to {}", T::BOUNDS.0, T::BOUNDS.1)
+    }
+
+    fn visit_f64<E: de::Error>(self, value: f64) -> Result<Whole<T>, E> {
+        Err(E::invalid_value(de::Unexpected::Other(&format!("`{}`", Rounded(value))), &self))
     }
 
     fn visit_i64<E: de::Error>(self, value: i64) -> Result<Whole<T>, E> {

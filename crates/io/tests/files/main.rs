@@ -1,6 +1,8 @@
 //! Tests of file formats: setpoints, traces, recordings and URDF.
 
 mod bounded_recording;
+mod encodings;
+mod output;
 mod psec_csv;
 mod psec_mcap;
 mod psec_yaml;

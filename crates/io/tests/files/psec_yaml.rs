@@ -188,7 +188,7 @@ fn errors_of_unknown_files_list_the_supported_kinds() {
         (b"t,x\n0,0\n", "f: the first line is \"t,x\"; supported are setpoints as CSV"),
         (b"foo: 1\nbar: [2]\n", "f: the file is a mapping with keys foo, bar; supported are"),
         (b"- 1\n", "f: the first line is \"- 1\"; supported are"),
-        (b"\x89PNG\r\n\x1a\n\0\0\0", "f: the file is not UTF-8 text; supported are"),
+        (b"\x89PNG\r\n\x1a\n\0\0\0", "f: the file is binary, must be text; supported are"),
         (b"moves: {x: 1\n", "f:1: invalid YAML: "),
     ] {
         let path = folder.file("f", bytes);
@@ -204,4 +204,21 @@ fn errors_of_unknown_files_list_the_supported_kinds() {
     assert!(message.starts_with("no/such: "), "{message}");
     let message = Input::open("/".as_ref()).expect_err("must be rejected").to_string();
     assert!(message.starts_with("/: "), "{message}");
+}
+
+#[test]
+fn values_of_points_are_bounded() {
+    let points =
+        |fields: &str| error(&format!("joint_names: [c]\npoints:\n- {{positions: [0]}}\n- {{{fields}}}\n"));
+    for (fields, found) in [
+        ("positions: [1.0e+307]", "1e307 in positions"),
+        ("positions: [1], velocities: [-2.5e+9]", "-2500000000 in velocities"),
+        ("positions: [1], velocities: [1], accelerations: [1.0e+300]", "1e300 in accelerations"),
+        ("positions: [1], effort: [1.0e+300]", "1e300 in effort"),
+    ] {
+        let message = points(&format!("{fields}, time_from_start: {{sec: 1}}"));
+        assert_eq!(message, format!("p.yaml:4: point 1: {found}, must lie in ±1e9 (m or rad, and s)"));
+    }
+    let message = points("positions: [1], time_from_start: {sec: 1.0e+300}");
+    assert!(message.contains("`1e300`") && message.contains("an integer from -2147483648 to"), "{message}");
 }

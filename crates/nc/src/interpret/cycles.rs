@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use virtual_axes_core::units::{DEGREE, MILLIMETER};
+use virtual_axes_core::units::{DEGREE, MILLIMETER, Rounded};
 
 use super::codes::{FeedMode, HolePattern, Motion, ReturnLevel, g_name};
 use super::dialect::Dialect;
@@ -102,7 +102,10 @@ impl State {
         let strokes = f64::from(repeats) * pecks.count;
         if strokes > MAX_PECKS {
             let what = if cycle.peck.is_some() { "pecks" } else { "repetitions" };
-            return Err(format!("{name}: {strokes} {what} in one line; at most {MAX_PECKS} are allowed"));
+            return Err(format!(
+                "{name}: {} {what} in one line; at most {MAX_PECKS} are allowed",
+                Rounded(strokes)
+            ));
         }
         let (start, target) = (self.programmed(), self.targets(block)?);
         self.modal.cycle = Some(cycle);

@@ -4,7 +4,9 @@ use std::fmt;
 use std::io::{BufRead, Seek, SeekFrom};
 use std::str::FromStr;
 
-use super::encoding::Encoding;
+use virtual_axes_core::encoding::TextEncoding;
+
+use super::encoding::read_line;
 
 /// Bytes at the start of a program in which its dialect is detected.
 const DETECTION_BYTES: usize = 1 << 20;
@@ -101,9 +103,9 @@ impl DetectedDialect {
     pub fn of<R: BufRead + Seek>(source: &mut R) -> Self {
         let mut scores: [Score; Dialect::ALL.len()] = Default::default();
         let (mut bytes, mut line) = (0, Vec::new());
-        let encoding = Encoding::of(source.fill_buf().unwrap_or_default());
+        let encoding = TextEncoding::of(source.fill_buf().unwrap_or_default());
         for number in 1.. {
-            let read = encoding.read_line(source, LINE_BYTES, &mut line).unwrap_or(0);
+            let read = read_line(encoding, source, LINE_BYTES, &mut line).unwrap_or(0);
             bytes += read;
             if read == 0 || bytes > DETECTION_BYTES {
                 break;
@@ -126,10 +128,10 @@ impl DetectedDialect {
 /// Returns true for a text of which at least half of the lines are words of G code, and one is at all.
 /// Programs of other controls, whose format an error names, are such a text too.
 pub fn is_g_code(head: &[u8]) -> bool {
-    let encoding = Encoding::of(head);
+    let encoding = TextEncoding::of(head);
     let (mut rest, mut line) = (head, Vec::new());
     let (mut words, mut others) = (0, 0);
-    while encoding.read_line(&mut rest, LINE_BYTES, &mut line).is_ok_and(|read| read > 0) {
+    while read_line(encoding, &mut rest, LINE_BYTES, &mut line).is_ok_and(|read| read > 0) {
         let line = String::from_utf8_lossy(&line).trim().to_ascii_uppercase();
         if foreign_format(&line).is_some() {
             return true;

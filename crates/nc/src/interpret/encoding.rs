@@ -2,47 +2,25 @@
 
 use std::io::{self, BufRead};
 
-/// Encoding of a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Encoding {
-    /// Bytes that contain ASCII: UTF-8 and code pages.
-    #[default]
-    Bytes,
-    Utf16 {
-        is_big_endian: bool,
-    },
-}
+use virtual_axes_core::encoding::TextEncoding;
 
-impl Encoding {
-    /// Returns the encoding of a file with these first bytes: by its mark, or by the zeros of ASCII characters.
-    pub(super) fn of(head: &[u8]) -> Self {
-        match head {
-            [0xff, 0xfe, ..] => Self::Utf16 { is_big_endian: false },
-            [0xfe, 0xff, ..] => Self::Utf16 { is_big_endian: true },
-            [1..=255, 0, 1..=255, 0, ..] => Self::Utf16 { is_big_endian: false },
-            [0, 1..=255, 0, 1..=255, ..] => Self::Utf16 { is_big_endian: true },
-            _ => Self::Bytes,
-        }
+/// Reads a line without its end: CR, LF or both; of a longer one than `limit`, its start. Returns the number of bytes,
+/// 0 at the end of the file. Control characters other than the tab are omitted.
+pub(crate) fn read_line(
+    encoding: TextEncoding,
+    reader: &mut impl BufRead,
+    limit: usize,
+    line: &mut Vec<u8>,
+) -> io::Result<usize> {
+    line.clear();
+    let read = match encoding {
+        TextEncoding::Bytes => read_bytes(reader, limit, line),
+        TextEncoding::Utf16 { is_big_endian } => read_utf16(reader, is_big_endian, limit, line),
+    }?;
+    if line.iter().any(is_padding) {
+        line.retain(|byte| !is_padding(byte));
     }
-
-    /// Reads a line without its end: CR, LF or both; of a longer one than `limit`, its start. Returns the number of bytes,
-    /// 0 at the end of the file. Control characters other than the tab are omitted.
-    pub(super) fn read_line(
-        self,
-        reader: &mut impl BufRead,
-        limit: usize,
-        line: &mut Vec<u8>,
-    ) -> io::Result<usize> {
-        line.clear();
-        let read = match self {
-            Self::Bytes => read_bytes(reader, limit, line),
-            Self::Utf16 { is_big_endian } => read_utf16(reader, is_big_endian, limit, line),
-        }?;
-        if line.iter().any(is_padding) {
-            line.retain(|byte| !is_padding(byte));
-        }
-        Ok(read)
-    }
+    Ok(read)
 }
 
 fn is_padding(byte: &u8) -> bool {
@@ -95,9 +73,11 @@ fn read_utf16(
         match if is_big_endian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) } {
             0xfeff => {}
             0x0a => break,
-            unit @ 0..0x80 => line.push(unit as u8),
-            // Other characters occur in comments.
-            _ => line.push(b'?'),
+            // Halves of characters occur in comments.
+            unit => {
+                let c = char::from_u32(u32::from(unit)).unwrap_or('?');
+                line.extend_from_slice(c.encode_utf8(&mut [0; 4]).as_bytes());
+            }
         }
     }
     Ok(read)
@@ -108,10 +88,10 @@ mod tests {
     use super::*;
 
     fn lines(mut bytes: &[u8]) -> Vec<String> {
-        let encoding = Encoding::of(bytes);
+        let encoding = TextEncoding::of(bytes);
         let mut line = Vec::new();
         let mut found = Vec::new();
-        while encoding.read_line(&mut bytes, 100, &mut line).unwrap() > 0 {
+        while read_line(encoding, &mut bytes, 100, &mut line).unwrap() > 0 {
             found.push(String::from_utf8_lossy(&line).into_owned());
         }
         found

@@ -1,5 +1,7 @@
 //! Words of one line.
 
+use virtual_axes_core::units::Rounded;
+
 use super::codes::g_name;
 use super::dialect::Dialect;
 use super::error::Outcome;
@@ -127,7 +129,7 @@ impl LineWords {
                 let code = integer(value * 10.0)
                     .and_then(|code| u16::try_from(code).ok())
                     .filter(|code| *code < 10_000);
-                let code = code.ok_or_else(|| format!("G{value} is not a G code"))?;
+                let code = code.ok_or_else(|| format!("G{} is not a G code", Rounded(value)))?;
                 if ignored.has_g(code) {
                     self.ignored.push(g_name(code));
                 } else {
@@ -136,7 +138,7 @@ impl LineWords {
                 }
             }
             b'm' if !self.is_macro => {
-                let code = integer(value).ok_or_else(|| format!("M{value} is not an M code"))?;
+                let code = integer(value).ok_or_else(|| format!("M{} is not an M code", Rounded(value)))?;
                 require_count(self.m.len() + self.ignored.len(), "M codes")?;
                 match ignored.has_m(code) {
                     true => self.ignored.push(format!("M{code}")),
@@ -192,9 +194,10 @@ impl LineWords {
     /// Returns the value of a word that must be 0 or positive, which then counts as used.
     pub(super) fn take_rate(&mut self, letter: char) -> Outcome<Option<f64>> {
         match self.take(letter) {
-            Some(value) if !(0.0..=MAX_RATE).contains(&value) => {
-                Err(format!("word {letter}: {value} is invalid, must be between 0 and {MAX_RATE:e}"))
-            }
+            Some(value) if !(0.0..=MAX_RATE).contains(&value) => Err(format!(
+                "word {letter}: {} is invalid, must be between 0 and {MAX_RATE:e}",
+                Rounded(value)
+            )),
             value => Ok(value),
         }
     }
@@ -208,7 +211,8 @@ impl LineWords {
     /// Returns the value of a word as an integer from 0, which then counts as used.
     pub(super) fn take_integer(&mut self, letter: char) -> Outcome<Option<u32>> {
         let Some(value) = self.take(letter) else { return Ok(None) };
-        let required = || format!("word {letter}: {value} is invalid, an integer from 0 is required");
+        let required =
+            || format!("word {letter}: {} is invalid, an integer from 0 is required", Rounded(value));
         integer(value).map(Some).ok_or_else(required)
     }
 

@@ -45,6 +45,7 @@ use std::io::{BufRead, Seek};
 use virtual_axes_core::text::escaped;
 
 pub use dialect::{DetectedDialect, Dialect, is_g_code};
+pub(crate) use encoding::read_line;
 pub use error::ProgramError;
 pub use ignored::{CodePattern, IgnoredCodes};
 pub use limits::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};

@@ -2,8 +2,10 @@
 
 use std::io::{BufRead, Cursor, Seek, SeekFrom};
 
+use virtual_axes_core::encoding::TextEncoding;
+
 use super::dialect::{foreign_format, is_word_line};
-use super::encoding::Encoding;
+use super::encoding::read_line;
 use super::error::Outcome;
 use super::limits::{MAX_IDLE_LINES, MAX_LINE};
 
@@ -32,7 +34,7 @@ const HEAD_LINES: usize = 200;
 /// Encoding, start and format of a file by its first lines.
 #[derive(Debug)]
 pub(super) struct SourceHead {
-    encoding: Encoding,
+    encoding: TextEncoding,
     /// Line of the first percent sign, if only a text without words stands before it.
     start: Place,
     /// Format of another control.
@@ -42,11 +44,11 @@ pub(super) struct SourceHead {
 impl SourceHead {
     /// Reads the first lines of a file, and returns to its start.
     pub(super) fn of<R: BufRead + Seek>(reader: &mut R) -> Self {
-        let encoding = Encoding::of(reader.fill_buf().unwrap_or_default());
+        let encoding = TextEncoding::of(reader.fill_buf().unwrap_or_default());
         let mut head = Self { encoding, start: Place::START, foreign: None };
         let (mut offset, mut line) = (0, Vec::new());
         for lines in 0..HEAD_LINES {
-            let read = encoding.read_line(reader, MAX_LINE, &mut line).unwrap_or(0);
+            let read = read_line(encoding, reader, MAX_LINE, &mut line).unwrap_or(0);
             if read == 0 {
                 break;
             }
@@ -75,8 +77,8 @@ pub(super) struct LineSource<R> {
     /// First line of the program, which a text without words may precede.
     start: Place,
     /// Files of subprograms: text, and its place that is read next.
-    files: Vec<(Cursor<Vec<u8>>, Encoding)>,
-    encoding: Encoding,
+    files: Vec<(Cursor<Vec<u8>>, TextEncoding)>,
+    encoding: TextEncoding,
     /// Line of the program that was read last, from 1.
     program_line: usize,
     /// End of the farthest line that was read, bytes.
@@ -129,7 +131,7 @@ impl<R: BufRead + Seek> LineSource<R> {
         if self.files.len() >= MAX_FILES {
             return Err(format!("the program calls more than {MAX_FILES} files"));
         }
-        let encoding = Encoding::of(&text);
+        let encoding = TextEncoding::of(&text);
         self.files.push((Cursor::new(text), encoding));
         Ok(Place { file: self.files.len(), ..Place::START })
     }
@@ -208,8 +210,8 @@ impl<R: BufRead + Seek> LineSource<R> {
         loop {
             let limit = MAX_LINE + 2;
             let read = match self.next.file.checked_sub(1).and_then(|index| self.files.get_mut(index)) {
-                Some((file, encoding)) => encoding.read_line(file, limit, line),
-                None => self.encoding.read_line(&mut self.reader, limit, line),
+                Some((file, encoding)) => read_line(*encoding, file, limit, line),
+                None => read_line(self.encoding, &mut self.reader, limit, line),
             }
             .map_err(|error| error.to_string())?;
             if read == 0 {

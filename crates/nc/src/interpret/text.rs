@@ -1,5 +1,6 @@
 //! Compact text of a line: comments and blanks removed, letters in lower case.
 
+use virtual_axes_core::encoding::decode;
 use virtual_axes_core::text::escaped;
 
 use super::dialect::Dialect;
@@ -137,7 +138,7 @@ fn any_comment(rest: &[u8]) -> &[u8] {
 
 /// Returns the message of a comment `MSG, …`.
 fn message(comment: &[u8]) -> Option<String> {
-    let comment = String::from_utf8_lossy(comment);
+    let comment = decode(comment);
     let (key, text) = comment.split_once(',')?;
     key.trim().eq_ignore_ascii_case("msg").then(|| escaped(text.trim()))
 }

@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use virtual_axes_core::encoding::decode_text;
 use virtual_axes_core::units::MILLIMETER;
 
 /// Largest number of tools in a table.
@@ -64,12 +65,14 @@ impl ToolTable {
     ///
     /// Returns an error with the file, if it cannot be read, is longer than 16 MiB, or contains an invalid entry.
     pub fn from_file(path: &Path) -> Result<Self, String> {
-        let mut text = String::new();
+        let mut bytes = Vec::new();
         let name = path.display();
-        let read = File::open(path).and_then(|file| file.take(MAX_TABLE + 1).read_to_string(&mut text));
+        let read = File::open(path).and_then(|file| file.take(MAX_TABLE + 1).read_to_end(&mut bytes));
         match read.map_err(|error| format!("{name}: {error}"))? as u64 > MAX_TABLE {
             true => Err(format!("{name}: the table is longer than {MAX_TABLE} bytes")),
-            false => Self::parse(&text).map_err(|error| format!("{name}: {error}")),
+            false => decode_text(&bytes)
+                .and_then(|text| Self::parse(&text))
+                .map_err(|error| format!("{name}: {error}")),
         }
     }
 

@@ -6,6 +6,7 @@ use std::io::{self, BufRead};
 use nalgebra::Vector3;
 use virtual_axes_core::assess::StandingTurn;
 use virtual_axes_core::config::{AxisKind, MachineConfig};
+use virtual_axes_core::encoding::{TextEncoding, decode};
 use virtual_axes_core::kinematics::{Kinematics, ToolPose};
 use virtual_axes_core::statistics::rms_of_sum;
 use virtual_axes_core::text::BuiltinFiles;
@@ -16,6 +17,7 @@ use virtual_axes_core::units::{Nanoseconds, seconds};
 use super::operations::{OperationMeter, OperationSummary};
 use super::setpoints::ProgramTrack;
 use crate::builtin::open_program;
+use crate::interpret::read_line;
 use crate::plan::{ProgrammedCorner, ProgrammedPath};
 
 /// Number of lines reported.
@@ -43,6 +45,8 @@ const CORNER_RADIUS: f64 = 2e-3;
 const SMALLEST_TURN: f64 = 5e-3;
 /// Longest text of a line that is shown, characters.
 const TEXT: usize = 60;
+/// Number of bytes of a line that are read; the interpreter rejects longer lines.
+const LINE_BYTES: usize = 1 << 13;
 
 /// Cause of an error, by the setpoints around it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -515,13 +519,19 @@ pub fn line_texts(
     builtin: &BuiltinFiles,
     lines: &BTreeSet<usize>,
 ) -> io::Result<BTreeMap<usize, String>> {
-    let last = lines.last().copied().unwrap_or(0);
-    let texts = open_program(name, builtin)?.split(b'\n').take(last).enumerate();
-    let shown = |(i, text): (usize, io::Result<Vec<u8>>)| {
-        let text = text.map(|text| String::from_utf8_lossy(&text).trim().chars().take(TEXT).collect());
-        lines.contains(&(i + 1)).then(|| Ok((i + 1, text?)))
-    };
-    texts.filter_map(shown).collect()
+    let mut reader = open_program(name, builtin)?;
+    let encoding = TextEncoding::of(reader.fill_buf()?);
+    let mut texts = BTreeMap::new();
+    let mut line = Vec::new();
+    for number in 1..=lines.last().copied().unwrap_or(0) {
+        if read_line(encoding, &mut reader, LINE_BYTES, &mut line)? == 0 {
+            break;
+        }
+        if lines.contains(&number) {
+            texts.insert(number, decode(&line).trim().chars().take(TEXT).collect());
+        }
+    }
+    Ok(texts)
 }
 
 /// Returns the distance of a point from the line between two points, and the place of its nearest point from 0 to 1.

@@ -233,7 +233,7 @@ fn items(step: &ProgramStep, spindle: &mut f64) -> Vec<Item> {
         ProgramStep::Event { event, .. } => event,
     };
     let item = match event {
-        ProgramEvent::Dwell(time) => Item::event("dwell", &[*time]),
+        ProgramEvent::Dwell(time) | ProgramEvent::Pause(time) => Item::event("dwell", &[*time]),
         ProgramEvent::Stop => Item::event("PROGRAM_STOP", &[]),
         ProgramEvent::OptionalStop => Item::event("OPTIONAL_PROGRAM_STOP", &[]),
         ProgramEvent::End => Item::event("PROGRAM_END", &[]),

@@ -216,7 +216,7 @@ fn part_program(
         }
         // The first setpoint is the start, of line 0.
         let point = input.track().borrow_mut().setpoints.pop_front();
-        let line = point.map(|point| point.line).filter(|line| *line > 0);
+        let line = point.map(|point| point.0.line).filter(|line| *line > 0);
         audit.add(time, line, psec.iter().copied());
         time += machine.periods().position;
     }

@@ -6,6 +6,7 @@ use virtual_axes_core::units::{MILLIMETER, Rounded};
 use virtual_axes_nc::offline::ProgramSurvey;
 
 use crate::input::program_text::joint_line;
+use crate::output::text_table::wrapped_line;
 
 /// Returns the summary of a part program.
 pub fn summary(survey: &ProgramSurvey, machine: &MachineConfig) -> String {
@@ -18,12 +19,14 @@ pub fn summary(survey: &ProgramSurvey, machine: &MachineConfig) -> String {
     let joints: String = joints
         .map(|(joint, axis)| joint_line(axis, [start[joint], end[joint]], ranges[joint], None))
         .collect();
-    format!(
-        "part program for {}: {:.3} s at the programmed feed, without rapid traverse and acceleration\n\
-         motions: {rapids} rapid, {lines} lines, {arcs} arcs, {splines} splines; {} m at feed{shortest}\n\
-         {joints}",
+    let time = format!(
+        "part program for {}: {:.3} s at the programmed feed, without rapid traverse and acceleration",
         escaped(machine.name()),
-        survey.time,
-        Rounded(*length),
-    )
+        survey.time
+    );
+    let motions = format!(
+        "motions: {rapids} rapid, {lines} lines, {arcs} arcs, {splines} splines; {} m at feed{shortest}",
+        Rounded(*length)
+    );
+    wrapped_line(&time) + &wrapped_line(&motions) + &joints
 }

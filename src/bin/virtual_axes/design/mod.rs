@@ -65,20 +65,23 @@ enum DesignMethod {
         #[command(flatten)]
         proportional: ProportionalArguments,
         /// Integral time Ti, ms.
-        #[arg(long, allow_negative_numbers = true)]
+        #[arg(long, value_name = "MS", allow_negative_numbers = true)]
         integral_time_ms: f64,
         #[command(flatten)]
         common: CommonDesignArguments,
     },
     /// Design a PID controller with derivative action on the position.
+    #[command(
+        override_usage = "virtual_axes design pid [OPTIONS] --integral-time-ms <MS>\n           --derivative-time-ms <MS>"
+    )]
     Pid {
         #[command(flatten)]
         proportional: ProportionalArguments,
         /// Integral time Ti, ms.
-        #[arg(long, allow_negative_numbers = true)]
+        #[arg(long, value_name = "MS", allow_negative_numbers = true)]
         integral_time_ms: f64,
         /// Derivative time Td, ms.
-        #[arg(long, allow_negative_numbers = true)]
+        #[arg(long, value_name = "MS", allow_negative_numbers = true)]
         derivative_time_ms: f64,
         /// Filter time Tf of the derivative, ms; 0 disables the filter.
         #[arg(long, allow_negative_numbers = true, default_value_t = 0.0)]

@@ -11,7 +11,7 @@ use virtual_axes_core::text::wrapped;
 use virtual_axes_core::trajectory::RejectionCode;
 
 /// Largest length of a line.
-const WIDTH: usize = 100;
+const WIDTH: usize = 80;
 /// Indentation of descriptions.
 const INDENT: usize = 4;
 
@@ -93,7 +93,7 @@ fn diagnostic_kind(kind: &DiagnosticKind) -> Json {
     json!({ "status": kind.status, "keys": keys.collect::<Vec<_>>() })
 }
 
-/// Returns the interface as text of at most 100 columns.
+/// Returns the interface as text of at most 80 columns.
 pub fn text() -> String {
     let mut out = String::new();
     for (title, direction) in

@@ -7,6 +7,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use virtual_axes_core::text::escaped;
 use virtual_axes_identify::tune::Progress;
 
 use crate::output::interrupt;
@@ -189,7 +190,7 @@ impl Spinner {
 
     /// Shows the current activity. Returns an error if the command was interrupted.
     pub fn set_activity(&self, activity: impl Into<String>) -> io::Result<()> {
-        self.bar.set_message(activity.into());
+        self.bar.set_message(escaped(&activity.into()));
         interrupt::check()
     }
 }

@@ -69,7 +69,8 @@ pub struct ReportMachine {
 
 /// Returns what is needed to repeat the runs.
 pub fn provenance(machine: &ReportMachine) -> Vec<(String, String)> {
-    let command: Vec<String> = std::env::args().skip(1).map(|argument| quoted(&argument)).collect();
+    let command: Vec<String> =
+        std::env::args_os().skip(1).map(|argument| quoted(&argument.to_string_lossy())).collect();
     let file = match Parameters::builtin_text(&machine.source, crate::builtin::MACHINES) {
         Ok(text) => Some(blake3::hash(text.as_bytes())),
         Err(_) => std::fs::read(&machine.source).ok().map(|bytes| blake3::hash(&bytes)),

@@ -1,29 +1,62 @@
-//! Tables as text for the terminal, at most 100 columns wide.
+//! Tables as text for the terminal, at most 80 columns wide.
 
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Width, presets};
 use virtual_axes_core::text::wrapped;
 use virtual_axes_report::{Table, TableColumn};
 
 /// Largest length of a line, characters.
-pub const WIDTH: u16 = 100;
-/// Blanks between two columns.
-const GAP: u16 = 2;
+pub const WIDTH: u16 = 80;
+/// Blanks between two columns: of a table that fits with it, and of a wider one.
+const GAPS: [u16; 2] = [2, 1];
+/// Width of a column of text that is worth a smaller gap.
+const TEXT: u16 = 16;
+/// Length from which a word is divided anywhere.
+const WORD: u16 = 24;
+/// Length of a word of a heading from which it is divided behind a hyphen.
+const LONG_WORD: usize = 12;
 
 /// Formats a table with the first column aligned left, the others right.
 pub fn text(table: &Table) -> String {
     aligned(table, &[0])
 }
 
-/// Formats a table with the columns `left` aligned left, the others right. Headings and texts are wrapped between words
-/// if the table is wider than [`WIDTH`]; numbers are not.
+/// Formats a table with the columns `left` aligned left, the others right. If the table is wider than [`WIDTH`], headings
+/// and texts are wrapped between words and behind hyphens, and the gaps between the columns are smaller; numbers are not
+/// wrapped.
 pub fn aligned(table: &Table, left: &[usize]) -> String {
+    let columns = 0..table.columns.len();
+    let natural =
+        columns.clone().map(|index| widest(table, index).max(heading_width(table, index)) + GAPS[0]);
+    if natural.sum::<u16>() <= WIDTH + GAPS[0] {
+        return arranged(table, left, GAPS[0]);
+    }
+    let mut table = table.clone();
+    for column in &mut table.columns {
+        let words = column.name.split(' ').map(|word| match word.chars().count() > LONG_WORD {
+            true => word.replace('-', "-\n"),
+            false => word.to_owned(),
+        });
+        column.name = words.collect::<Vec<_>>().join(" ");
+    }
+    let smallest = |index: usize| match left.contains(&index) {
+        true => widest(&table, index).min(TEXT).max(longest_word(&table, index)),
+        false => longest_word(&table, index),
+    };
+    let width = |gap: u16| columns.clone().map(|index| smallest(index) + gap).sum::<u16>() - gap;
+    let gap = GAPS.into_iter().find(|gap| width(*gap) <= WIDTH).unwrap_or(GAPS[1]);
+    arranged(&table, left, gap)
+}
+
+/// Formats a table with this gap between its columns.
+fn arranged(table: &Table, left: &[usize], gap: u16) -> String {
     let mut out = comfy_table::Table::new();
     out.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
     out.set_header(table.columns.iter().map(heading));
     out.add_rows(&table.rows);
-    let texts = text_widths(table, left);
+    let texts = text_widths(table, left, gap);
+    let last = table.columns.len();
     for (index, column) in out.column_iter_mut().enumerate() {
-        column.set_padding((0, GAP));
+        column.set_padding((0, if index + 1 == last { 0 } else { gap }));
         column.set_cell_alignment(if left.contains(&index) {
             CellAlignment::Left
         } else {
@@ -31,7 +64,9 @@ pub fn aligned(table: &Table, left: &[usize]) -> String {
         });
         let text = texts.iter().find(|(column, _)| *column == index).map_or(0, |(_, width)| *width);
         let smallest = text.max(longest_word(table, index));
-        column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(smallest + GAP)));
+        column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(
+            smallest + if index + 1 == last { 0 } else { gap },
+        )));
     }
     let lines: Vec<String> = out.lines().map(|line| line.trim_end().to_owned() + "\n").collect();
     lines.concat()
@@ -39,16 +74,16 @@ pub fn aligned(table: &Table, left: &[usize]) -> String {
 
 /// Returns the smallest width of each column of text. They share what the columns of numbers leave; the narrowest gets
 /// what it needs first.
-fn text_widths(table: &Table, left: &[usize]) -> Vec<(usize, u16)> {
+fn text_widths(table: &Table, left: &[usize], gap: u16) -> Vec<(usize, u16)> {
     let numbers = (0..table.columns.len()).filter(|index| !left.contains(index));
-    let used: u16 = numbers.map(|index| longest_word(table, index) + GAP).sum();
+    let used: u16 = numbers.map(|index| longest_word(table, index) + gap).sum();
     let mut widths: Vec<(usize, u16)> = left.iter().map(|&index| (index, widest(table, index))).collect();
     widths.sort_by_key(|(_, width)| *width);
     let mut spare = WIDTH.saturating_sub(used);
     let mut count = u16::try_from(left.len()).unwrap_or(1);
     for (_, width) in &mut widths {
-        *width = (*width).min((spare / count.max(1)).saturating_sub(GAP));
-        spare = spare.saturating_sub(*width + GAP);
+        *width = (*width).min((spare / count.max(1)).saturating_sub(gap));
+        spare = spare.saturating_sub(*width + gap);
         count = count.saturating_sub(1);
     }
     widths
@@ -67,14 +102,19 @@ pub fn columns_beside_text(headings: impl Iterator<Item = String>) -> usize {
 }
 
 /// Returns the length of the longest part of a column that is not divided: a word, or a figure of some words such as
-/// "8.75 … 11".
+/// "12.79 of 54".
 fn longest_word(table: &Table, index: usize) -> u16 {
     /// Longest figure, characters.
-    const FIGURE: usize = 10;
+    const FIGURE: usize = 12;
     let heading = table.columns.get(index).map(heading).unwrap_or_default();
     let cells = table.rows.iter().filter_map(|row| row.get(index)).map(String::as_str);
     let figures = cells.clone().filter(|cell| cell.chars().count() <= FIGURE);
-    longest(figures.chain(cells.chain([heading.as_str()]).flat_map(str::split_whitespace)))
+    longest(figures.chain(cells.chain([heading.as_str()]).flat_map(str::split_whitespace))).min(WORD)
+}
+
+/// Returns the length of the heading of a column on one line.
+fn heading_width(table: &Table, index: usize) -> u16 {
+    longest(table.columns.get(index).map(heading).as_deref().into_iter())
 }
 
 /// Returns the length of the longest cell of a column.

@@ -237,7 +237,8 @@ fn single(run: &SimulatedRun) -> Vec<String> {
     let remarks = run.remarks().into_iter().filter(|remark| !verdict.contains(remark.as_str()));
     axes.extend(remarks.map(|remark| text_table::wrapped_line(&remark)));
     let path = run.path_table();
-    let path = (!path.rows.is_empty()).then(|| format!("{}{}\n", text_table::text(&path), table::SAMPLING));
+    let path =
+        (!path.rows.is_empty()).then(|| text_table::text(&path) + &text_table::wrapped_line(table::SAMPLING));
     let energy = table::energy(figures);
     let energy = (!energy.rows.is_empty()).then(|| text_table::text(&energy));
     let program = run.part_program.as_ref().map(part_program_text);

@@ -9,6 +9,7 @@ use serde::de::{self, Deserializer, Visitor};
 
 use super::unit::{Channel, Unit};
 use crate::files::error::FileError;
+use virtual_axes_core::encoding::decode_text;
 use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 use virtual_axes_core::yaml;
 
@@ -104,13 +105,14 @@ impl Columns {
     pub fn open(path: &Path) -> Result<Self, FileError> {
         let at = path.display().to_string();
         let unreadable = |error: std::io::Error| FileError::new(&at, error);
-        let mut text = String::new();
+        let mut bytes = Vec::new();
         let file = fs::File::open(path).map_err(unreadable)?;
-        file.take(MAX_FILE_BYTES).read_to_string(&mut text).map_err(unreadable)?;
-        if text.len() as u64 == MAX_FILE_BYTES {
+        file.take(MAX_FILE_BYTES).read_to_end(&mut bytes).map_err(unreadable)?;
+        if bytes.len() as u64 == MAX_FILE_BYTES {
             let reason = format!("a column mapping file must be shorter than {MAX_FILE_BYTES} bytes");
             return Err(FileError::new(at, reason));
         }
+        let text = decode_text(&bytes).map_err(|reason| FileError::new(&at, reason))?;
         Self::from_yaml(&text, &at)
     }
 

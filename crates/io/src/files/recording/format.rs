@@ -32,7 +32,7 @@ pub(super) type Found<T> = Result<T, FileError>;
 impl FileError {
     /// Creates an error of text that cannot be read.
     pub(super) fn not_text(at: impl Display, reason: impl Display) -> Self {
-        Self::new(at, format_args!("{reason}; a recording is text in UTF-8 (CSV) or MCAP"))
+        Self::new(at, format_args!("{reason}; a recording is text (CSV) or MCAP"))
     }
 
     /// Creates an error of a recording with too many samples.

@@ -44,6 +44,7 @@ use super::input::{FileKind, Input};
 use context::Context;
 use format::Found;
 use virtual_axes_core::config::AxisConfig;
+use virtual_axes_core::encoding::decode;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 
 /// Number of bytes that determine the format of a file.
@@ -61,7 +62,7 @@ impl RecordingFormat {
         if head.starts_with(::mcap::MAGIC) {
             return RecordingFormat::Mcap;
         }
-        let text = String::from_utf8_lossy(head);
+        let text = decode(head);
         let of_controls: [(Self, Detection); 4] = [
             (RecordingFormat::SinumerikTrace, sinumerik_trace::detects),
             (RecordingFormat::SinumerikEdge, sinumerik_edge::detects),

@@ -20,6 +20,7 @@ use super::recording_columns::RecordingColumns;
 use super::sinumerik_signal::edge_signal;
 use super::unit::Channel;
 use crate::files::error::FileError;
+use virtual_axes_core::encoding::TextReader;
 use virtual_axes_core::text::shortened;
 use virtual_axes_core::units::MILLISECOND;
 use virtual_axes_identify::recording::{Finding, RawRecording};
@@ -31,8 +32,7 @@ const MAX_SIGNALS: usize = 10_000;
 
 /// Returns true if a text file that begins with `head` has the format.
 pub(super) fn detects(head: &str) -> bool {
-    head.trim_start_matches('\u{feff}').trim_start().starts_with('{')
-        && head.contains(&format!("\"{SIGNALS}\""))
+    head.trim_start().starts_with('{') && head.contains(&format!("\"{SIGNALS}\""))
 }
 
 /// Lists the columns with their detected meanings. `name` is the name of the file.
@@ -134,7 +134,7 @@ impl<'a> Document<'a> {
     }
 
     fn parse(&mut self, input: impl Read, name: &str) -> Found<()> {
-        let mut json = serde_json::Deserializer::from_reader(BufReader::new(input));
+        let mut json = serde_json::Deserializer::from_reader(BufReader::new(TextReader::new(input)));
         let outcome =
             json.deserialize_map(Node { document: self, level: Level::Document }).and_then(|()| json.end());
         let Err(error) = outcome else { return Ok(()) };

@@ -23,6 +23,7 @@ use super::sinumerik_signal::trace_signal;
 use super::trace_samples::TraceSamples;
 use super::unit::Channel;
 use crate::files::error::FileError;
+use virtual_axes_core::encoding::TextReader;
 use virtual_axes_core::text::shortened;
 use virtual_axes_identify::recording::{Finding, RawRecording};
 
@@ -41,7 +42,7 @@ const FREE_SAMPLES: usize = 100_000;
 
 /// Returns true if a text file that begins with `head` has the format.
 pub(super) fn detects(head: &str) -> bool {
-    head.trim_start_matches('\u{feff}').trim_start().starts_with('<') && head.contains(&format!("<{ROOT}"))
+    head.trim_start().starts_with('<') && head.contains(&format!("<{ROOT}"))
 }
 
 /// Lists the columns with their detected meanings. `name` is the name of the file.
@@ -134,7 +135,7 @@ impl<'a> Frame<'a> {
 
     /// Reads the first frame of values.
     fn read(&mut self, input: impl Read) -> Found<()> {
-        let mut xml: Xml<_> = Reader::from_reader(LineCounter::new(BufReader::new(input)));
+        let mut xml: Xml<_> = Reader::from_reader(LineCounter::new(BufReader::new(TextReader::new(input))));
         let mut buffer = Vec::new();
         let mut depth = 0_usize;
         let mut frames = 0_usize;

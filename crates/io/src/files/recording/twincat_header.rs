@@ -27,7 +27,6 @@ const MAX_LINES: usize = 200;
 
 /// Returns true for the export of a scope: `Name` in the first line, and the start of the recording.
 pub(super) fn is_twincat(text: &str) -> bool {
-    let text = text.trim_start_matches('\u{feff}');
     delimiter_of(text).is_some()
         && text.lines().take(MAX_LINES).any(|line| STARTS.iter().any(|key| line.starts_with(key)))
 }

@@ -1,5 +1,7 @@
 //! Words of one block: G and M codes, axes, addresses with values, and keywords.
 
+use virtual_axes_core::units::Rounded;
+
 use super::super::error::Outcome;
 use super::super::limits::MAX_CODES;
 use super::super::parameters::integer;
@@ -180,9 +182,10 @@ impl Words {
     /// Returns the number of an address that must be 0 or positive, which then counts as used.
     pub(super) fn positive(&mut self, address: &str, largest: f64) -> Outcome<Option<f64>> {
         match self.number(address)? {
-            Some(value) if !(0.0..=largest).contains(&value) => {
-                Err(format!("word {address}: {value} is invalid, must be between 0 and {largest:e}"))
-            }
+            Some(value) if !(0.0..=largest).contains(&value) => Err(format!(
+                "word {address}: {} is invalid, must be between 0 and {largest:e}",
+                Rounded(value)
+            )),
             value => Ok(value),
         }
     }
@@ -190,7 +193,8 @@ impl Words {
     /// Returns the integer of an address, which then counts as used.
     pub(super) fn integer(&mut self, address: &str) -> Outcome<Option<u32>> {
         let Some(value) = self.number(address)? else { return Ok(None) };
-        let required = || format!("word {address}: {value} is invalid, an integer from 0 is required");
+        let required =
+            || format!("word {address}: {} is invalid, an integer from 0 is required", Rounded(value));
         integer(value).map(Some).ok_or_else(required)
     }
 
