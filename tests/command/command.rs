@@ -360,7 +360,7 @@ fn completions_contain_subcommands_scenarios_machines_programs_parameters_and_fi
         (&["check", "circle-d"], &["circle-diamond-square"]),
         (&["tune", "corner-90", "--also", "corner-4"], &["corner-45"]),
         (&["run", "ballbar", "--machine", "gan"], &["gantry_router"]),
-        (&["machines", "--new", "vm"], &["vmc"]),
+        (&["machines", "--new", "vm"], &["vmc", "vmc_a"]),
         (&["run", "ballbar", "--set", "y.velocity_loop.g"], &["y.velocity_loop.gain="]),
         (&["run", "ballbar", "--trace-pe"], &["--trace-period"]),
     ] {

@@ -39,7 +39,8 @@ fn the_summary_has_motions_time_and_extents() {
     assert!(lines[0].starts_with(&expected), "{summary}");
     // The reversal point of the arc is at X 60; the tool length of the machine is 100 mm.
     for line in [
-        "motions: 1 rapid, 2 lines, 1 arcs, 0 splines; 0.0928319 m at feed, shortest motion 30 mm",
+        "motions: 1 rapid, 2 lines, 1 arcs, 0 splines; 0.0928319 m at feed, shortest",
+        "    motion 30 mm",
         "x: start 0.000 mm, end 40.000 mm, range 0.000 to 60.000 mm",
         "y: start 0.000 mm, end 40.000 mm, range 0.000 to 40.000 mm",
         "z: start 0.000 mm, end 150.000 mm, range 0.000 to 150.000 mm",

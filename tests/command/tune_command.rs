@@ -100,8 +100,8 @@ fn the_text_compares_initial_and_best_tuning() {
     let text = printed(&arguments);
     let lines: Vec<&str> = text.lines().collect();
     assert!(lines[0].starts_with("cost contour: ") && lines[0].contains("; modulus margin "), "{text}");
-    assert!(lines[2].ends_with("corner.yaml: Mikron UCP 710 of x, y, cost contour"), "{text}");
-    assert!(lines[4].starts_with("tuning "), "{text}");
+    let table = lines.iter().position(|line| line.starts_with("tuning ")).expect("a table");
+    assert!(lines[table - 2].ends_with("corner.yaml: Mikron UCP 710 of x, y, cost contour"), "{text}");
     for start in ["initial ", "best ", "x.position_loop.gpc.lambda_rel ", "N1 ", "path "] {
         assert!(lines.iter().any(|line| line.starts_with(start)), "{start}: {text}");
     }
@@ -146,7 +146,7 @@ fn deviating_plants_are_listed() {
         "friction × 1.3 ",
         "Kt × 0.7 ",
         "Kt × 1.3 ",
-        "worst combination: ",
+        "worst ",
     ];
     assert!(lines[0].starts_with("cost contour: ") && lines[0].contains(" at worst; "), "{text}");
     // Headings and long names are continued in further lines.

@@ -130,7 +130,8 @@ pub fn is_file_name(name: &str) -> bool {
 /// `builtin`.
 pub fn nearest_input<'a>(name: &str, builtin: impl Iterator<Item = &'a str>) -> Option<String> {
     let mut files = neighbors(name);
-    files.retain(|file| file != name);
+    // A name can have been escaped for a message.
+    files.retain(|file| file != name && escaped(file) != escaped(name));
     let stem = FilePath::new(name).file_stem();
     let same = files.iter().find(|file| FilePath::new(file).file_stem() == stem);
     same.cloned().or_else(|| nearest_name(name, builtin.map(str::to_owned).chain(files.iter().cloned())))

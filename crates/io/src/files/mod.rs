@@ -43,10 +43,10 @@ pub use psec_mcap::McapTrajectories;
 pub use psec_row::{PsecRow, TimeGap};
 pub use psec_writer::{PsecCsvWriter, PsecMcapWriter, PsecYamlWriter};
 pub use psec_yaml::read_psec_yaml;
+pub use recording::recorded_psec::RecordedPsec;
 pub use recording::{
-    Channel, ColumnUnit, Columns, FoundColumn, RecordedPsec, RecordingColumns, RecordingFormat,
-    RecordingOptions, inspect_recording, inspect_recording_stream, read_recording, read_recording_mcap,
-    read_recording_stream,
+    Channel, ColumnUnit, Columns, FoundColumn, RecordingColumns, RecordingFormat, RecordingOptions,
+    inspect_recording, inspect_recording_stream, read_recording, read_recording_mcap, read_recording_stream,
 };
 pub use row_writer::{RowWriter, psec_writer, trace_writer};
 pub use trace_csv::TraceCsvWriter;

@@ -251,7 +251,7 @@ fn binary_files_and_missing_files_are_rejected() {
     let read = |bytes: &'static [u8]| {
         PsecCsvReader::new(bytes, "p.csv", TSP, &limits()).expect_err("must be rejected")
     };
-    assert_eq!(read(b"time,x\n0,0\xff\n").to_string(), "p.csv:2: stream did not contain valid UTF-8");
+    assert_eq!(read(b"time,x\n0,0\xff\n").to_string(), "p.csv:2: x is \"0ÿ\", must be a finite number");
     let endless =
         PsecCsvReader::new(io::repeat(b'7'), "/dev/zero", TSP, &limits()).expect_err("must be rejected");
     assert_eq!(endless.to_string(), "/dev/zero:1: the line is longer than 65536 bytes");

@@ -5,7 +5,6 @@
 
 use super::dialect::{ALL, Dialect, FANUC, GRBL, HAAS, LINUXCNC, MACH3, OKUMA};
 use super::error::Outcome;
-use super::line_words::LineWords;
 
 /// Dialects with codes of production controls.
 const FH: u8 = FANUC | HAAS;
@@ -339,14 +338,15 @@ pub(super) struct Codes {
 }
 
 impl Codes {
-    /// Sorts the codes of a line into their groups; G codes are in tenths.
+    /// Sorts the G codes, in tenths, and M codes of a line into their groups. `has_mapping` is true if the line has words
+    /// of G107.
     ///
     /// # Errors
     ///
     /// Two codes of one group, if the dialect does not allow them.
-    pub(super) fn new(block: &LineWords, dialect: Dialect) -> Outcome<Self> {
+    pub(super) fn new(g: &[u16], m: &[u32], has_mapping: bool, dialect: Dialect) -> Outcome<Self> {
         let mut codes = Codes::default();
-        for &code in &block.g {
+        for &code in g {
             if code == Motion::NurbsEnd.number() && dialect == Dialect::LinuxCnc {
                 return Err("G5.3 without G5.2".to_owned());
             }
@@ -360,13 +360,13 @@ impl Codes {
             }
             let is_without_effect = |row: &&(u16, u8, &str)| row.0 == code && row.1 & dialect.bit() != 0;
             // Without words, G107 ends the mapping.
-            let is_mapping = code == 1070 && block.has_any(&['A', 'B', 'C', 'Q', 'R']);
+            let is_mapping = code == 1070 && has_mapping;
             match WITHOUT_EFFECT.iter().find(is_without_effect).filter(|_| !is_mapping) {
                 Some((_, _, letters)) => codes.without_effect.push((g_name(code), letters)),
                 None => codes.unsupported.push((g_name(code), remedy(code, dialect))),
             }
         }
-        for &code in &block.m {
+        for &code in m {
             let number = u16::try_from(code).unwrap_or(u16::MAX);
             if codes.m.add(number, dialect)? {
                 continue;

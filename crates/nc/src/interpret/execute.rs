@@ -36,7 +36,8 @@ impl State {
             return self.spline_line(block);
         }
         self.moves_in_machine_coordinates = false;
-        let codes = Codes::new(block, self.dialect)?;
+        let has_mapping = block.has_any(&['A', 'B', 'C', 'Q', 'R']);
+        let codes = Codes::new(&block.g, &block.m, has_mapping, self.dialect)?;
         if self.request_macro(block, &codes)? {
             return Ok(());
         }

@@ -112,6 +112,10 @@ impl AuditedAxis {
         }
     }
 
+    fn is_outside(&self) -> bool {
+        self.extremes.is_some_and(|extremes| extremes.iter().any(|extreme| extreme.beyond > 0))
+    }
+
     /// Returns true if the setpoints of the axis move.
     pub fn moves(&self) -> bool {
         self.extremes.is_some_and(|[lowest, highest]| highest.position > lowest.position)
@@ -208,9 +212,9 @@ impl LimitAudit {
         }
     }
 
-    /// Returns the axes that move.
+    /// Returns the axes that move or stand outside of their travel.
     pub fn moving(&self) -> impl Iterator<Item = &AuditedAxis> {
-        self.axes.iter().filter(|axis| axis.moves())
+        self.axes.iter().filter(|axis| axis.moves() || axis.is_outside())
     }
 }
 

@@ -253,7 +253,7 @@ fn builtin_machines_are_valid_and_the_default_is_the_first() {
     let axes =
         |name: &str| machine(name).axes().iter().map(|axis| axis.name().to_owned()).collect::<String>();
     let axes: Vec<String> = names.iter().map(|name| axes(name)).collect();
-    assert_eq!(axes, ["xyzac", "xyzac", "xyz", "xyzb", "xyz", "xyzbc", "xyzac"]);
+    assert_eq!(axes, ["xyzac", "xyzac", "xyz", "xyzb", "xyz", "xyzbc", "xyzac", "xyza", "xyzac"]);
     assert_eq!(Parameters::load("mikron_ucp710", virtual_axes_builtin::MACHINES), Ok(mikron()));
 }
 

@@ -14,7 +14,7 @@ mod join;
 mod layout;
 mod line_counter;
 mod mcap;
-mod recorded_psec;
+pub(super) mod recorded_psec;
 mod recording_builder;
 mod recording_columns;
 mod series;
@@ -35,7 +35,6 @@ pub use columns::Columns;
 pub use context::RecordingOptions;
 pub use format::RecordingFormat;
 pub use found_column::{ColumnUnit, FoundColumn};
-pub use recorded_psec::RecordedPsec;
 pub use recording_columns::RecordingColumns;
 pub use unit::Channel;
 
