@@ -9,7 +9,7 @@ use super::error::FileError;
 use super::lines::{Lines, fields};
 use super::psec_error::{MAX_TIME, TIME, header_unit_hint, separator_hint, unit_hint};
 use super::psec_row::{PsecRow, TimeGap, TimeSteps};
-use super::recording::RecordedPsec;
+use super::recording::recorded_psec::RecordedPsec;
 use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 use virtual_axes_core::trajectory::spline::{KinematicState, Segment, SplineDegree};
 use virtual_axes_core::trajectory::{JointLimits, Rejection};
