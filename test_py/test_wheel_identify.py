@@ -165,7 +165,8 @@ def test_learned_setpoints_have_the_values_of_the_command(machine: va.Machine) -
     assert found.best == expected["best"] > 0
     # The compensated setpoints are repeatable: a run of them has the following errors of the iteration.
     again = machine.simulate(found.psec, figures="axes").figures["axes"]
-    assert again["x"] == expected["iterations"][found.best]["figures"]["axes"]["x"]
+    figures = expected["iterations"][found.best]["figures"]["axes"]["x"]
+    assert again["x"] == {key: value for key, value in figures.items() if key != "energy"}
     with pytest.raises(ValueError, match="gain 3: must be above 0 and at most 2"):
         va.learn(machine, va.scenario("corner-90"), gain=3)
 
