@@ -52,21 +52,6 @@ impl Experiment {
         self.period
     }
 
-    /// Returns the experiment with `phases` samples in each position cycle, the first at its beginning, without recorded
-    /// values.
-    pub(super) fn at_phases(&self, phases: usize) -> Experiment {
-        let count = self.psec.len() * phases;
-        Experiment {
-            first: 0.0,
-            period: self.cycle / phases as f64,
-            trace_filter: None,
-            position: vec![f64::NAN; count],
-            velocity: vec![f64::NAN; count],
-            current: None,
-            ..self.clone()
-        }
-    }
-
     /// Ends the experiment `duration` s after the start of its first motion.
     pub(super) fn shorten(&mut self, duration: f64) {
         let moving = self.psec.windows(2).position(|pair| pair[0] != pair[1]).unwrap_or_default();

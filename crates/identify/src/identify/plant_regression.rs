@@ -1,15 +1,12 @@
 //! Inertia, friction and gravity from any motion, by regression of the current.
 //!
-//! `i = Jeq (a + a_ripple) / (Kt r) + s f(|V|) + C_gravity / Kt + δ di/dt` (Prévost eqs. 1 to 3) over all samples in motion.
-//! a_ripple is the difference between the current that the control logs and the mean over a position cycle, by simulation of
-//! the closed loop, as an acceleration. A recording does not say whether the control logs a mean or the current at some phase of its cycle: the
-//! result is the mean of the results of all [`sampling hypotheses`](CurrentRipple), weighted by their probability, and the
-//! standard errors include their spread (Bayesian model averaging). The lag δ of the current is fitted with a prior. The
-//! friction law is parametrized such that a + c ≥ 0 and d < b always hold. Each standstill
+//! `i = Jeq a / (Kt r) + s f(|V|) + C_gravity / Kt + ρ i_ripple + δ di/dt` (Prévost eqs. 1 to 3) over all samples in motion.
+//! i_ripple is the difference between the current of an instant and the mean over a position cycle, by simulation of the
+//! closed loop; its share ρ and the lag δ of the current are fitted with a prior, since a recording does not say how the
+//! control logs its current. The friction law is parametrized such that a + c ≥ 0 and d < b always hold. Each standstill
 //! bounds the gravity: friction holds any current within ±i0 around it.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::covariance::posterior_covariance;
 use super::delays::correlation_inflation;
@@ -45,22 +42,20 @@ const SIGNIFICANT: f64 = 3.0;
 /// Gravity relative to friction below which it is neglected.
 const RELEVANT: f64 = 0.02;
 /// Center and standard deviation of the prior of −c / a, b in min/m and ln(−d m/min), within which the axes of Prévost
-/// Appendix 2 lie; of the lag of the current, s.
-const PRIOR: [(f64, f64); 4] = [(0.35, 0.2), (0.016, 0.01), (-1.1, 0.5), (0.0, 0.25e-3)];
+/// Appendix 2 lie; of the share of the ripple, from that of a mean to that of an instant; of the lag of the current, s.
+const PRIOR: [(f64, f64); 5] = [(0.35, 0.2), (0.016, 0.01), (-1.1, 0.5), (0.4, 0.5), (0.0, 0.25e-3)];
 /// Bounds of these.
-const BOUNDS: [(f64, f64); 4] = [(-1.0, 0.98), (0.0, 0.08), (-2.9, 1.5), (-1e-3, 1e-3)];
-/// Probability, before the fit, that a control logs the mean current of a cycle, and that at its beginning; the rest belongs
-/// to the other phases.
-const MEAN: f64 = 1.0 / 3.0;
-const BEGINNING: f64 = 1.0 / 3.0;
+const BOUNDS: [(f64, f64); 5] = [(-1.0, 0.98), (0.0, 0.08), (-2.9, 1.5), (-1.0, 1.2), (-1e-3, 1e-3)];
+/// Index of the share of the ripple, and its standard error beyond that of the fit.
+const RIPPLE: usize = 6;
+const RIPPLE_ERROR: f64 = 0.25;
 /// Noise of the current in the first pass and least noise in the second one, relative to the largest current.
 const NOISE: f64 = 0.01;
 const LEAST_NOISE: f64 = 2e-3;
 /// Correlation above which two parameters are reported as collinear.
 const COLLINEAR: f64 = 0.95;
 
-/// Ripple of the current, logged at one phase of the position cycle, at each sample of each span of each recording, A; NaN
-/// where it is unknown.
+/// Ripple of the current at each sample of each span of each recording, A; NaN where it is unknown.
 pub(super) type CurrentRipple = Vec<Vec<Vec<f64>>>;
 
 /// Result of the regression.
@@ -74,8 +69,7 @@ pub(super) struct PlantRegression {
     pub gravity: GravityFit,
     /// Coefficient of determination R² over the samples in motion.
     pub r_squared: f64,
-    /// Share, in the recorded current, of the ripple at the beginning of the cycles and its standard error; none without
-    /// ripple.
+    /// Share of the ripple in the recorded current and its standard error; none without ripple.
     pub ripple: Option<(f64, f64)>,
     /// Pairs of collinear parameters with their correlation.
     pub collinear: Vec<(&'static str, &'static str, f64)>,
@@ -88,9 +82,8 @@ const NAMES: [&str; 6] = ["inertia", "gravity", "friction.a", "friction.c", "fri
 struct Sample {
     acceleration: f64,
     current: f64,
-    /// Derivative of the filtered current, A/s.
+    /// Derivative of the filtered current, A/s, and filtered ripple, A.
     slope: f64,
-    /// Filtered ripple as an acceleration, m/s² or rad/s², since it is proportional to the inertia.
     ripple: f64,
     /// First of the fine speeds around the sample.
     from: usize,
@@ -150,7 +143,6 @@ impl MovingData {
     ) {
         let (Some(current), Some(raw)) = (&span.smooth_current, &span.current) else { return };
         let unit = axis.units().speed;
-        let per_acceleration = axis.motor.inertia / (axis.motor.torque_constant * axis.transmission_ratio);
         let spline = CubicSpline::new(&span.position, period);
         let fine = period / steps as f64;
         let count = (span.position.len().saturating_sub(1)) * steps + 1;
@@ -179,8 +171,7 @@ impl MovingData {
             } else {
                 self.add_standstill(&mut standing);
             }
-            let ripple =
-                ripple.map_or(0.0, |ripple| ripple.get(i).copied().unwrap_or(f64::NAN) / per_acceleration);
+            let ripple = ripple.map_or(0.0, |ripple| ripple.get(i).copied().unwrap_or(f64::NAN));
             let is_known = current[i].is_finite() && raw[i].is_finite() && raw[i].abs() < limit;
             let last = current.len().saturating_sub(1);
             let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
@@ -248,7 +239,8 @@ impl MovingData {
             .iter()
             .zip(friction)
             .map(|(sample, friction)| {
-                x[0] * (sample.acceleration + sample.ripple) + x[1] + friction - x[6] * sample.slope
+                let logged = x[RIPPLE] * sample.ripple - x[7] * sample.slope;
+                x[0] * sample.acceleration + x[1] + friction + logged
             })
             .collect()
     }
@@ -325,25 +317,24 @@ fn smoothed(signals: &Signals) -> Signals {
     Signals { cutoff: CUTOFF, spans: signals.spans.iter().map(of).collect(), ..signals.clone() }
 }
 
-/// Fits inertia, friction and gravity, with the unfiltered ripples at the phases of the position cycle, the beginning first,
-/// if they are known; none if the axis hardly moves. A gravity that is not significant, or that of a rotary axis, which a
-/// constant does not describe, is that of the model without it.
+/// Fits inertia, friction and gravity, with the unfiltered ripple of the current if it is known; none if the axis hardly
+/// moves. A gravity that is not significant, or that of a rotary axis, which a constant does not describe, is that of the
+/// model without it.
 pub(super) fn fit_plant(
     recordings: &[&Signals],
     axis: &AxisConfig,
-    ripples: &[CurrentRipple],
+    ripple: Option<&CurrentRipple>,
 ) -> Option<PlantRegression> {
     let smooth: Vec<Signals> = recordings.iter().map(|signals| smoothed(signals)).collect();
-    let of_phase = |all: &CurrentRipple| -> CurrentRipple {
+    let ripple = ripple.map(|all| -> CurrentRipple {
         let of = |(signals, spans): (&Signals, &Vec<Vec<f64>>)| {
             let filter = GaussianFilter::new(signals.cutoff, signals.period);
             spans.iter().map(|ripple| filtered(&filter, ripple)).collect()
         };
         smooth.iter().zip(all).map(of).collect()
-    };
-    let ripples: Vec<CurrentRipple> = ripples.iter().map(of_phase).collect();
+    });
     let recordings: Vec<&Signals> = smooth.iter().collect();
-    let free = average(&recordings, axis, &ripples, true)?;
+    let free = fit_plant_by_regression(&recordings, axis, ripple.as_ref(), true)?;
     let (value, error) = (free.gravity.current.constant.abs(), free.gravity.error.constant);
     let law = &free.friction.law.config;
     let is_kept = axis.kind() == AxisKind::Linear
@@ -352,7 +343,7 @@ pub(super) fn fit_plant(
     if is_kept {
         return Some(free);
     }
-    let mut fixed = average(&recordings, axis, &ripples, false)?;
+    let mut fixed = fit_plant_by_regression(&recordings, axis, ripple.as_ref(), false)?;
     fixed.gravity = GravityFit { model: GravityCurrent::default(), ..free.gravity };
     Some(fixed)
 }
@@ -368,78 +359,13 @@ fn filtered(filter: &GaussianFilter, signal: &[f64]) -> Vec<f64> {
     smooth
 }
 
-/// Returns the mean of the results with each ripple and without one, weighted by their probability.
-fn average(
+fn fit_plant_by_regression(
     recordings: &[&Signals],
     axis: &AxisConfig,
-    ripples: &[CurrentRipple],
+    ripple: Option<&CurrentRipple>,
     has_gravity: bool,
 ) -> Option<PlantRegression> {
-    let unknown: Option<&CurrentRipple> = ripples.first();
-    let phases = ripples.len();
-    let hypotheses: Vec<(Option<&CurrentRipple>, f64)> = match phases {
-        0 => vec![(None, 1.0)],
-        _ => {
-            let others = (1.0 - MEAN - BEGINNING) / phases as f64;
-            let at = ripples.iter().enumerate();
-            let at = at.map(|(k, ripple)| (Some(ripple), others + if k == 0 { BEGINNING } else { 0.0 }));
-            at.chain([(None, MEAN)]).collect()
-        }
-    };
-    let of = |(ripple, prior): &(Option<&CurrentRipple>, f64)| {
-        // All hypotheses have the samples whose ripple is known.
-        let mut data = MovingData::new(recordings, axis, ripple.or(unknown))?;
-        if ripple.is_none() {
-            data.samples.iter_mut().for_each(|sample| sample.ripple = 0.0);
-        }
-        let fit = regress(&data, recordings, axis, has_gravity)?;
-        Some((data, fit, *prior))
-    };
-    let fits: Vec<(MovingData, Regression, f64)> = hypotheses.par_iter().filter_map(of).collect();
-    let (best, least, _) = fits.iter().min_by(|a, b| a.1.squares.total_cmp(&b.1.squares))?;
-    // The residuals within a move are not independent: each move counts as one.
-    let deviance = |fit: &Regression| best.moves as f64 * (fit.squares / least.squares - 1.0);
-    let weights: Vec<f64> = fits.iter().map(|(_, fit, prior)| prior * (-0.5 * deviance(fit)).exp()).collect();
-    let all: f64 = weights.iter().sum();
-    let weighted = || fits.iter().zip(weights.iter().map(|weight| weight / all));
-    let size = least.values.len();
-    let mut values = DVector::zeros(size);
-    weighted().for_each(|((_, fit, _), weight)| values += weight * DVector::from_column_slice(&fit.values));
-    let mut covariance = DMatrix::zeros(size, size);
-    for ((_, fit, _), weight) in weighted() {
-        let distance = DVector::from_column_slice(&fit.values) - &values;
-        covariance += weight * (&fit.covariance + &distance * distance.transpose());
-    }
-    let of_beginning = |data: &MovingData| -> f64 {
-        let (mut product, mut square) = (0.0, 0.0);
-        let first = fits.first().map_or(data, |(first, ..)| first);
-        for (sample, first) in data.samples.iter().zip(&first.samples) {
-            product += sample.ripple * first.ripple;
-            square += first.ripple * first.ripple;
-        }
-        if square > 0.0 { product / square } else { 0.0 }
-    };
-    let share: f64 = weighted().map(|((data, ..), weight)| weight * of_beginning(data)).sum();
-    let spread: f64 =
-        weighted().map(|((data, ..), weight)| weight * (of_beginning(data) - share).powi(2)).sum();
-    let ripple = unknown.map(|_| (share, spread.sqrt()));
-    Some(result(best, &best.measured(recordings, axis), axis, (values.as_slice(), ripple), covariance))
-}
-
-/// Values of a regression in fitted form.
-struct Regression {
-    values: Vec<f64>,
-    covariance: DMatrix<f64>,
-    /// Sum of the squares of the residuals, A².
-    squares: f64,
-}
-
-fn regress(
-    data: &MovingData,
-    recordings: &[&Signals],
-    axis: &AxisConfig,
-    has_gravity: bool,
-) -> Option<Regression> {
+    let data = MovingData::new(recordings, axis, ripple)?;
     let measured = data.measured(recordings, axis);
     let largest = measured.iter().fold(0.0_f64, |most, i| most.max(i.abs())).max(f64::MIN_POSITIVE);
     let fastest = data.samples.iter().fold(0.0_f64, |most, s| most.max(s.acceleration.abs()));
@@ -450,7 +376,11 @@ fn regress(
         step: 1e-5 * (high - low),
     };
     let factor = 3.0 * largest / fastest.max(f64::MIN_POSITIVE);
-    let prior_of = |k: usize| bounded(PRIOR[k].0, BOUNDS[k].0, BOUNDS[k].1);
+    let prior_of = |k: usize| {
+        let ((center, _), (low, high)) = (PRIOR[k], BOUNDS[k]);
+        // Without ripple its share is nothing.
+        if k == 3 && ripple.is_none() { bounded(0.0, -1e-9, 1e-9) } else { bounded(center, low, high) }
+    };
     let mut parameters = vec![
         bounded(0.3 * factor, 0.0, factor),
         if has_gravity { bounded(0.0, -2.0 * largest, 2.0 * largest) } else { bounded(0.0, -1e-9, 1e-9) },
@@ -467,21 +397,26 @@ fn regress(
     };
     // The noise counts with the correlation of neighboring samples.
     let mut noise = NOISE * largest;
-    let (mut values, mut squares) = (Vec::new(), f64::NAN);
+    let mut values: Vec<f64> = Vec::new();
     for _ in 0..2 {
         (values, _) = descend(&parameters, Effort::Formula, |x| residuals(x, noise))?;
         let left = residuals(&values, noise)?;
         let left = left.as_slice().get(..measured.len())?;
         let count = left.len() as f64;
-        squares = left.iter().map(|residual| residual * residual).sum();
         let freedom = (count / (count - DETERMINED).max(1.0)).sqrt();
         noise = freedom * rms(left.iter().copied())? * correlation_inflation(left).sqrt();
         noise = noise.max(LEAST_NOISE * largest);
         parameters.iter_mut().zip(&values).for_each(|(parameter, value)| parameter.start = *value);
     }
     let clusters: Vec<Option<usize>> = data.samples.iter().map(|sample| Some(sample.cluster)).collect();
-    let covariance = posterior_covariance(&parameters, &values, |x| residuals(x, noise), &clusters, noise)?;
-    Some(Regression { values, covariance, squares })
+    let mut covariance =
+        posterior_covariance(&parameters, &values, |x| residuals(x, noise), &clusters, noise)?;
+    if ripple.is_some() {
+        // The others follow the share of the ripple, which the simulated loop does not determine exactly.
+        let along = covariance.column(RIPPLE) / covariance[(RIPPLE, RIPPLE)];
+        covariance += &along * along.transpose() * RIPPLE_ERROR.powi(2);
+    }
+    Some(result(&data, &measured, axis, (&values, ripple.is_some()), covariance))
 }
 
 /// Returns center and half width of the gravity currents that the standstills permit, A: friction holds the axis with any
@@ -502,7 +437,7 @@ fn result(
     data: &MovingData,
     measured: &[f64],
     axis: &AxisConfig,
-    (x, ripple): (&[f64], Option<(f64, f64)>),
+    (x, has_ripple): (&[f64], bool),
     covariance: DMatrix<f64>,
 ) -> PlantRegression {
     let error = |k: usize| covariance[(k, k)].max(0.0).sqrt();
@@ -554,7 +489,7 @@ fn result(
             at_rest: gravity_at_rest(&data.still, law.i0),
         },
         r_squared,
-        ripple,
+        ripple: has_ripple.then(|| (x[RIPPLE], error(RIPPLE))),
         collinear,
     }
 }

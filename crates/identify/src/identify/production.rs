@@ -39,8 +39,6 @@ const GAIN_CHANGE: f64 = 0.15;
 const CLEAR: f64 = 1.5;
 /// Ratio of two residuals that explain a motion alike.
 const ALIKE: f64 = 1.1;
-/// Number of phases of the position cycle at which a control can log the current.
-const PHASES: usize = 8;
 /// Number of times that the plant is identified with the ripple of the loop.
 const PLANT_PASSES: usize = 2;
 /// Longest duration of motion of a recording that is simulated for delays and gains, s; all of it is compared at the end.
@@ -75,7 +73,7 @@ pub(super) fn identify_production(
         ));
     }
     let has_current = signals.iter().any(|signals| signals.spans.iter().any(|span| span.current.is_some()));
-    let plant = fit_plant(&signals, &found.axis, &[]);
+    let plant = fit_plant(&signals, &found.axis, None);
     if let Some(plant) = &plant {
         apply_plant(plant, found);
     } else {
@@ -157,9 +155,9 @@ fn identify_loop(
     let before = found.axis.clone();
     for _ in 0..if has_plant { PLANT_PASSES } else { 0 } {
         found.axis = fit.axis.clone();
-        let ripples = simulated_ripples(&recordings, &fit);
+        let ripple = simulated_ripple(&recordings, &fit);
         let signals: Vec<&Signals> = recordings.iter().map(|(signals, _)| *signals).collect();
-        let Some(plant) = fit_plant(&signals, &found.axis, &ripples) else { break };
+        let Some(plant) = fit_plant(&signals, &found.axis, Some(&ripple)) else { break };
         apply_plant(&plant, found);
         found.current_ripple = plant.ripple;
         // The velocity loop keeps its bandwidth.
@@ -176,47 +174,23 @@ fn identify_loop(
     report_interpolation(inputs, seconds(fit.periods.position), found);
 }
 
-/// Returns the ripple of the current at the samples for some phases of the position cycle, its beginning first: the simulated
-/// current of an instant minus the mean over a cycle. The instants have that distance from the samples if the recording shows
-/// the position cycles; otherwise from the beginnings of the cycles, since a control logs at one phase of its cycles.
-fn simulated_ripples(recordings: &[(&Signals, FeedforwardMode)], fit: &LoopFit) -> Vec<CurrentRipple> {
-    let unknown = |signals: &Signals| -> Vec<Vec<f64>> {
-        signals.spans.iter().map(|span| vec![f64::NAN; span.position.len()]).collect()
-    };
-    let unknown: CurrentRipple = recordings.iter().map(|(signals, _)| unknown(signals)).collect();
-    let mut ripples = vec![unknown; PHASES];
-    for (k, (signals, mode)) in recordings.iter().enumerate() {
-        for recorded in trace_experiments(signals, k, &fit.periods, (*mode, 0.0, 1.0)) {
-            let at = recorded.at_phases(PHASES);
-            let mean = Experiment { ripple: 0.0, ..at.clone() };
-            let simulated = [&at, &mean].map(|experiment| simulate(&fit.axis, &fit.periods, experiment));
-            let [Ok(instant), Ok(mean)] = simulated else { continue };
-            let ripple: Vec<f64> = instant.current.iter().zip(&mean.current).map(|(a, m)| a - m).collect();
-            let is_several =
-                shows_cycles(signals, &signals.spans[recorded.span], seconds(fit.periods.position));
-            for (phase, to) in ripples.iter_mut().enumerate() {
-                let to = to[k][recorded.span].iter_mut().skip(recorded.sample).take(recorded.position.len());
-                for (i, value) in to.enumerate() {
-                    let place = (recorded.first + i as f64 * recorded.period()) / at.period();
-                    let cycle = (place / PHASES as f64).floor();
-                    // Between two cycles of one phase the ripple is interpolated.
-                    let (from, step, part) = match is_several {
-                        true => (place.round() + phase as f64, 0, 0.0),
-                        false => {
-                            (cycle * PHASES as f64 + phase as f64, PHASES, place / PHASES as f64 - cycle)
-                        }
-                    };
-                    let (from, last) = (from.max(0.0) as usize, ripple.len().saturating_sub(1));
-                    if let (Some(a), Some(b)) =
-                        (ripple.get(from.min(last)), ripple.get((from + step).min(last)))
-                    {
-                        *value = a + part * (b - a);
-                    }
-                }
-            }
+/// Returns the ripple of the current at the samples: the simulated current of an instant minus the mean over a
+/// position cycle.
+fn simulated_ripple(recordings: &[(&Signals, FeedforwardMode)], fit: &LoopFit) -> CurrentRipple {
+    let of = |(k, (signals, mode)): (usize, &(&Signals, FeedforwardMode))| {
+        let mut ripple: Vec<Vec<f64>> =
+            signals.spans.iter().map(|span| vec![f64::NAN; span.position.len()]).collect();
+        for instant in trace_experiments(signals, k, &fit.periods, (*mode, 0.0, 1.0)) {
+            let mean = Experiment { ripple: 0.0, ..instant.clone() };
+            let simulated = [&instant, &mean].map(|experiment| simulate(&fit.axis, &fit.periods, experiment));
+            let [Ok(at), Ok(mean)] = simulated else { continue };
+            let difference = at.current.iter().zip(&mean.current).map(|(a, m)| a - m);
+            let to = ripple[instant.span].iter_mut().skip(instant.sample);
+            to.zip(difference).for_each(|(to, value)| *to = value);
         }
-    }
-    ripples
+        ripple
+    };
+    recordings.iter().enumerate().map(of).collect()
 }
 
 /// Returns true if setpoints of position cycles of `tsp` s are interpolated between the samples of PSEC.
