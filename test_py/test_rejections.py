@@ -207,6 +207,20 @@ def test_rejected_with_its_reason(motion: Motion, case: Case):
     assert assert_psec(drive, motion.start, plan, max(before, motion.start), after) >= 3
 
 
+@pytest.mark.parametrize(("residual", "is_accepted"), [(1e-6, True), (-1e-6, True), (1.1e-6, False)])
+def test_a_residual_velocity_of_a_planner_is_taken_as_zero(fast: AxesClient, residual: float, is_accepted: bool):
+    """At most 1e-6 m/s: the axis comes to rest at the last point."""
+    go_home(fast)
+    sent = fast.send(joint_trajectory(["x"], [1.0], [[0.05]], [[residual]]))
+    if not is_accepted:
+        assert fast.decision(sent).code == R.VELOCITY_AT_END
+        return
+    end = fast.end(sent, 10)
+    assert end.status == R.COMPLETED
+    fast.wait_until(to_ns(end.header.stamp) + NANOSECONDS, 10)
+    assert fast.latest("psec")["x"] == pytest.approx(0.05, abs=1e-12)
+
+
 def test_axes_at_rest_do_not_move_on_a_rejection(start: Callable[..., AxesClient]):
     """A rejection without an active motion moves no axis."""
     drive = start()

@@ -285,6 +285,19 @@ def test_a_subprogram_outside_of_the_folder_is_not_read(programs: Follow, folder
     assert programs.send(Goal(path="calls.nc")).result(30).error_code == Result.SUCCESSFUL
 
 
+def test_a_subprogram_of_sinumerik_outside_of_the_folder_is_not_read(
+    programs: Follow, folder: Path, tmp_path: Path
+) -> None:
+    text = "G0 X1\nRET\n"
+    (tmp_path / "FERN.SPF").write_text(text)
+    (folder / "FERN.SPF").symlink_to(tmp_path / "FERN.SPF")
+    (folder / "main.mpf").write_text("DEF REAL WERT=1\nG71 G90\nFERN\nM30\n")
+    assert programs.send(Goal(path="main.mpf")).result(30).error_code == Result.PROGRAM_ERROR
+    (folder / "FERN.SPF").unlink()
+    (folder / "FERN.SPF").write_text(text)
+    assert programs.send(Goal(path="main.mpf")).result(30).error_code == Result.SUCCESSFUL
+
+
 def test_a_canceled_program_stops_within_the_limits(programs: Follow) -> None:
     sent = programs.send(Goal(program=LONG))
     sent.wait_for_feedback(20)

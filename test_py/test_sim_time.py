@@ -15,7 +15,16 @@ from action import Follow, goal, line
 from motion import assert_psec, swing
 from node_process import Node
 from sim_clock import SimClock
-from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, stamp_of, status_values, to_ns
+from virtual_axes_py.ros import (
+    NANOSECONDS,
+    TSP_NS,
+    AxesClient,
+    ParameterRejected,
+    joint_trajectory,
+    stamp_of,
+    status_values,
+    to_ns,
+)
 
 BEGIN = 1_000 * NANOSECONDS + 1_234_567
 """Position cycle, ns."""
@@ -222,6 +231,52 @@ def test_a_jump_stops_the_motion_and_starts_a_new_grid(clock: SimClock, to: Call
     again = drive.accept(joint_trajectory(["x"], [0.0, 0.06], [[psec[-1]]] * 2, stamp=begin))
     clock.advance(1.0, 0.02)
     assert drive.end(again.sequence_number, 5).status == TrajectoryResult.COMPLETED
+
+
+def test_the_clock_is_changed_while_the_node_runs(start: Callable[..., AxesClient]):
+    """A motion is aborted; the positions continue on the other clock, without a sample before its first message."""
+    drive = start()
+    times, position = swing(2.0)
+    for _ in range(2):
+        moved = drive.accept(joint_trajectory(["x"], times, position + drive.latest("psec")["x"])).sequence_number
+        drive.wait_for(lambda: abs(drive.latest("velocity")["x"]) > 1e-3, 5, "motion")
+        drive.set_parameters({"use_sim_time": True})
+        values = state_of(drive, "waiting for /clock")
+        assert (values["time"], values["clock"]) == ("sim", "none")
+        last = drive.latest("position")["x"]
+        drive.drop_samples()
+        clock = SimClock(drive, BEGIN)
+        drive.wait_for(lambda: clock._publisher.get_subscription_count() > 0, 10, "subscription of /clock")
+
+        def follows() -> bool:
+            # A best-effort message is lost if the subscription does not know the publisher yet.
+            clock.set(clock.now + TSP_NS)
+            return stamp_of(drive._samples["states"][-1]) < time.time_ns() // 2
+
+        drive.wait_for(follows, 10, "samples by /clock")
+        assert drive.end(moved, 5).status == TrajectoryResult.ABORTED
+        first = clock.now
+        clock.advance(1.0, 0.02)
+        assert np.array_equal(
+            stamps_since(drive, first, clock.now), np.arange(-(-first // TSP_NS) * TSP_NS, clock.now + 1, TSP_NS)
+        )
+        # The axis comes to rest within its limits, on less than 0.1 m.
+        assert 0.0 < abs(drive.latest("position")["x"] - last) < 0.1
+        rest = drive.latest("psec")["x"]
+        begin = clock.now + NANOSECONDS // 2
+        done = drive.accept(joint_trajectory(["x"], [0.0, 0.6], [[rest], [rest]], stamp=begin)).sequence_number
+        drive.set_parameters({"use_sim_time": False})
+        assert drive.end(done, 5).status == TrajectoryResult.ABORTED
+        drive.wait_for(lambda: abs(drive.now() - time.time_ns()) < NANOSECONDS, 5, "stamps of the wall clock")
+        assert drive.latest("psec")["x"] == pytest.approx(rest, abs=1e-12)
+        drive.node.destroy_publisher(clock._publisher)
+    assert drive.get_parameters(["use_sim_time"]) == {"use_sim_time": False}
+
+
+def test_fast_time_keeps_its_clock(fast: AxesClient):
+    """It publishes `/clock` and cannot follow it."""
+    with pytest.raises(ParameterRejected, match="time = fast publishes /clock"):
+        fast.set_parameters({"use_sim_time": True})
 
 
 def test_jumps_are_counted(clock: SimClock):

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use tokio::sync::oneshot;
+use tokio::sync::{oneshot, watch};
 
+use super::clock_follower::ClockState;
 use super::program_monitor::{ProgramPlace, ProgramRunFigures};
 use crate::validation::StreamSetpoints;
 use virtual_axes_core::machine::{AxisSample, MachineParameters};
@@ -26,6 +27,15 @@ impl MotionIds {
     pub fn next(&self) -> MotionId {
         MotionId(self.0.fetch_add(1, Ordering::Relaxed) + 1)
     }
+}
+
+/// Clock that paces the position cycles.
+#[derive(Debug)]
+pub enum Clock {
+    /// Wall clock.
+    Wall,
+    /// `/clock`: its followed state; `None` in `fast`, where this node publishes it.
+    Ros(Option<watch::Receiver<ClockState>>),
 }
 
 /// Command to the simulation; takes effect at the next position cycle.
@@ -92,6 +102,8 @@ pub enum Command {
         /// Resolves when the setpoints are at rest.
         done: oneshot::Sender<()>,
     },
+    /// Changes the clock: motions are aborted, as at a jump of the clock.
+    SetClock(Clock),
     /// Ends the thread.
     Shutdown,
 }

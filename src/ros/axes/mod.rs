@@ -21,7 +21,7 @@ mod wall;
 pub use arc_pool::ArcPool;
 pub use clock_follower::{ClockFollower, ClockState};
 pub use commands::{
-    Accepted, COMMAND_QUEUE, Command, MotionIds, PlannedSetpoints, SampleFrame, SimulationReport,
+    Accepted, COMMAND_QUEUE, Clock, Command, MotionIds, PlannedSetpoints, SampleFrame, SimulationReport,
 };
 pub use health::{AxisHealth, ClockSource, Health};
 pub use program_monitor::ProgramRunFigures;
@@ -30,10 +30,12 @@ pub use throttle::Throttle;
 pub use wall::origin;
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use tokio::runtime::Handle;
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{mpsc, oneshot, watch};
 
+use clock_follower::first_instant;
 use virtual_axes_core::simulation::Simulation;
 
 /// Channel ends of the axes' thread.
@@ -48,25 +50,86 @@ pub struct AxesChannels {
     pub health: watch::Sender<Health>,
 }
 
-/// Clock that paces the thread.
-pub enum Pace {
-    /// Wall clock.
-    Real(CooperativeTasks),
-    /// `/clock`.
-    Clock {
-        /// State of the followed clock; `None` in `fast`.
-        followed: Option<watch::Receiver<ClockState>>,
-        /// Runtime that drives timers and channels.
-        runtime: Handle,
-    },
+/// Pacing of the thread.
+pub struct Pace {
+    /// Clock at the start.
+    pub clock: Clock,
+    /// Tasks of the inputs and outputs of every position cycle.
+    pub tasks: CooperativeTasks,
+    /// Runtime that drives timers and channels.
+    pub runtime: Handle,
 }
 
 /// Runs the simulation until [`Command::Shutdown`] or until a channel is closed.
 pub fn run(simulation: Simulation, pace: Pace, channels: AxesChannels) {
-    let AxesChannels { commands, frames, reports, health } = channels;
-    let axes = stepper::Axes::new(simulation, reports, health);
-    match pace {
-        Pace::Real(tasks) => real::run(axes, commands, &frames, tasks),
-        Pace::Clock { followed, runtime } => runtime.block_on(paced::run(axes, commands, &frames, followed)),
+    let AxesChannels { mut commands, frames, reports, health } = channels;
+    let mut axes = stepper::Axes::new(simulation, reports, health);
+    let Pace { clock, mut tasks, runtime } = pace;
+    if matches!(clock, Clock::Wall) {
+        // The start of the node has taken time since the origin of the simulation was chosen.
+        axes.jump_to(first_instant(wall::now() + 1, axes.simulation().period()));
+    }
+    let mut next = Some(clock);
+    let mut has_stepped = false;
+    while let Some(clock) = next {
+        next = match clock {
+            Clock::Wall => real::run(&mut axes, &mut commands, &frames, &mut tasks),
+            Clock::Ros(followed) => {
+                let served = ServedTasks::start(tasks, &runtime);
+                let run = paced::run(&mut axes, &mut commands, &frames, followed, has_stepped);
+                let next = runtime.block_on(run);
+                if next.is_none() {
+                    // The tasks end with the frames.
+                    drop(frames);
+                    served.join(&runtime);
+                    return;
+                }
+                match served.stop(&runtime) {
+                    Some(stopped) => tasks = stopped,
+                    None => return,
+                }
+                next
+            }
+        };
+        has_stepped = true;
+    }
+}
+
+/// Tasks that another thread runs, because the publication may wait for subscribers.
+struct ServedTasks {
+    stop: oneshot::Sender<()>,
+    thread: tokio::task::JoinHandle<CooperativeTasks>,
+}
+
+impl ServedTasks {
+    /// Longest time in which the thread ends.
+    const TIMEOUT: Duration = Duration::from_secs(1);
+
+    /// Runs `tasks` until a stop, or until one of them ends.
+    fn start(mut tasks: CooperativeTasks, runtime: &Handle) -> Self {
+        let (stop, stopped) = oneshot::channel::<()>();
+        let handle = runtime.clone();
+        let thread = runtime.spawn_blocking(move || {
+            handle.block_on(async {
+                tokio::select! {
+                    () = &mut tasks.outputs => {}
+                    () = &mut tasks.inputs => {}
+                    Ok(()) = stopped => {}
+                }
+            });
+            tasks
+        });
+        ServedTasks { stop, thread }
+    }
+
+    /// Stops the tasks and returns them; `None` if they do not stop in time, or have ended.
+    fn stop(self, runtime: &Handle) -> Option<CooperativeTasks> {
+        self.stop.send(()).ok()?;
+        runtime.block_on(async { tokio::time::timeout(Self::TIMEOUT, self.thread).await.ok()?.ok() })
+    }
+
+    /// Waits until the tasks have ended.
+    fn join(self, runtime: &Handle) {
+        runtime.block_on(async { _ = tokio::time::timeout(Self::TIMEOUT, self.thread).await });
     }
 }

@@ -11,10 +11,10 @@ use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 
 use super::clock_follower::{ClockJump, ClockState, first_instant};
-use super::commands::{COMMAND_QUEUE, Command, SampleFrame};
+use super::commands::{COMMAND_QUEUE, Clock, Command, SampleFrame};
 use super::health::ClockSource;
 use super::stepper::Axes;
-use super::wall::IdleTimer;
+use super::wall::{self, IdleTimer};
 use virtual_axes_core::units::Nanoseconds;
 
 /// Condition for the computation of the next position cycle.
@@ -46,24 +46,26 @@ async fn changed(followed: &mut Option<watch::Receiver<ClockState>>) -> bool {
     }
 }
 
-/// Runs until [`Command::Shutdown`]; waits while the queue of frames is full. `followed` is the state of the followed
-/// clock, `None` in `fast`.
+/// Runs until [`Command::SetClock`], and returns the clock, or until [`Command::Shutdown`]; waits while the queue of frames is
+/// full. `followed` is the state of the followed clock, `None` in `fast`. `has_stepped` is true after a position cycle of
+/// another clock.
 pub(super) async fn run(
-    axes: Axes,
-    mut commands: mpsc::Receiver<Command>,
+    axes: &mut Axes,
+    commands: &mut mpsc::Receiver<Command>,
     frames: &mpsc::Sender<Arc<SampleFrame>>,
     mut followed: Option<watch::Receiver<ClockState>>,
-) {
+    has_stepped: bool,
+) -> Option<Clock> {
     let period = axes.simulation().period();
     let tick = Duration::from_nanos(period.unsigned_abs());
-    let mut axes =
-        PacedAxes { axes, waiting: VecDeque::new(), is_time_known: false, jumps: 0, has_stepped: false };
+    let mut axes = PacedAxes { axes, waiting: VecDeque::new(), is_time_known: false, jumps: 0, has_stepped };
     let mut idle_timer = IdleTimer::default();
     let mut ticks_at = None;
     loop {
         loop {
             match commands.try_recv() {
-                Ok(Command::Shutdown) | Err(mpsc::error::TryRecvError::Disconnected) => return,
+                Ok(Command::Shutdown) | Err(mpsc::error::TryRecvError::Disconnected) => return None,
+                Ok(Command::SetClock(clock)) => return axes.leave(clock),
                 Ok(command) => axes.receive(command),
                 Err(mpsc::error::TryRecvError::Empty) => break,
             }
@@ -90,10 +92,11 @@ pub(super) async fn run(
             tokio::select! {
                 biased;
                 command = commands.recv() => match command {
-                    Some(Command::Shutdown) | None => return,
+                    Some(Command::Shutdown) | None => return None,
+                    Some(Command::SetClock(clock)) => return axes.leave(clock),
                     Some(command) => axes.receive(command),
                 },
-                is_open = changed(&mut followed) => if !is_open { return },
+                is_open = changed(&mut followed) => if !is_open { return None },
                 () = until(ticks_at), if ticks_at.is_some() => {
                     ticks_at = None;
                     // An idle machine does not wait for space in the queue; it tries again at the next tick.
@@ -101,7 +104,7 @@ pub(super) async fn run(
                 }
                 reserved = frames.reserve(), if may_step => match reserved {
                     Ok(reserved) => permit = Some(reserved),
-                    Err(_) => return,
+                    Err(_) => return None,
                 },
             }
         }
@@ -121,8 +124,8 @@ async fn until(time: Option<tokio::time::Instant>) {
 }
 
 /// Axes with the commands that wait for the first time.
-struct PacedAxes {
-    axes: Axes,
+struct PacedAxes<'a> {
+    axes: &'a mut Axes,
     /// Trajectories and stops received before the first time, oldest first.
     waiting: VecDeque<Command>,
     /// True after the first time has been received.
@@ -133,7 +136,15 @@ struct PacedAxes {
     has_stepped: bool,
 }
 
-impl PacedAxes {
+impl PacedAxes<'_> {
+    /// Continues at the time of the wall clock, for which commands do not wait.
+    fn leave(mut self, clock: Clock) -> Option<Clock> {
+        self.axes.restart_at(self.axes.next_time(), wall::now());
+        self.apply_waiting();
+        self.axes.report_ends();
+        Some(clock)
+    }
+
     fn receive(&mut self, command: Command) {
         if self.is_time_known {
             self.axes.apply(command);
@@ -182,6 +193,7 @@ impl PacedAxes {
             | Command::UpdateParameters(_)
             | Command::Activate
             | Command::Deactivate { .. }
+            | Command::SetClock(_)
             | Command::Shutdown => self.axes.apply(command),
         }
     }

@@ -9,8 +9,7 @@ use futures::future::BoxFuture;
 use tokio::sync::mpsc;
 use tracing::warn;
 
-use super::clock_follower::first_instant;
-use super::commands::{Command, SampleFrame};
+use super::commands::{Clock, Command, SampleFrame};
 use super::health::ClockSource;
 use super::stepper::Axes;
 use super::wall::{PaceClock, since_epoch};
@@ -30,31 +29,30 @@ pub struct CooperativeTasks {
 /// displace unread frames in the queues of the subscribers.
 pub(super) const MAX_PUBLISHED_LATENESS: Duration = Duration::from_secs(1);
 
-/// Runs until [`Command::Shutdown`]. A frame is dropped and counted if the queue of frames is full.
+/// Runs until [`Command::SetClock`], and returns the clock, or until [`Command::Shutdown`]. A frame is dropped and counted if
+/// the queue of frames is full.
 pub(super) fn run(
-    mut axes: Axes,
-    mut commands: mpsc::Receiver<Command>,
+    axes: &mut Axes,
+    commands: &mut mpsc::Receiver<Command>,
     frames: &mpsc::Sender<Arc<SampleFrame>>,
-    mut tasks: CooperativeTasks,
-) {
-    // The start of the node has taken time since the origin of the simulation was chosen.
-    let now = Nanoseconds::try_from(since_epoch().as_nanos()).unwrap_or(Nanoseconds::MAX / 2);
-    axes.jump_to(first_instant(now + 1, axes.simulation().period()));
+    tasks: &mut CooperativeTasks,
+) -> Option<Clock> {
     let mut clock = PaceClock::new(axes.simulation(), since_epoch);
     axes.update_clock_health(|clock| clock.source = ClockSource::Wall);
     loop {
         if let Some(to) = clock.stepped_to(since_epoch) {
-            follow_step(&mut axes, to);
+            follow_step(axes, to);
             clock = PaceClock::new(axes.simulation(), since_epoch);
         }
         let mut lateness = clock.wait_for(axes.simulation().next_instant());
         if lateness > MAX_PUBLISHED_LATENESS {
-            catch_up(&mut axes, lateness, clock.newest_due(), |k| clock.lateness_of(k));
+            catch_up(axes, lateness, clock.newest_due(), |k| clock.lateness_of(k));
             lateness = clock.wait_for(axes.simulation().next_instant());
         }
         poll_once(&mut tasks.inputs);
-        if run_cycle(&mut axes, &mut commands, frames, lateness, lateness > clock.period).is_break() {
-            return;
+        let is_missed = lateness > clock.period;
+        if let ControlFlow::Break(next) = run_cycle(axes, commands, frames, lateness, is_missed) {
+            return next;
         }
         poll_once(&mut tasks.outputs);
     }
@@ -100,7 +98,8 @@ pub(super) fn catch_up(
     );
 }
 
-/// Runs one position cycle that has been due for `lateness`; breaks on [`Command::Shutdown`].
+/// Runs one position cycle that has been due for `lateness`; breaks on [`Command::SetClock`], with the clock, and on
+/// [`Command::Shutdown`].
 ///
 /// Allocates and frees memory only for trajectories and other rare commands, and when a motion ends.
 pub(super) fn run_cycle(
@@ -109,12 +108,13 @@ pub(super) fn run_cycle(
     frames: &mpsc::Sender<Arc<SampleFrame>>,
     lateness: Duration,
     is_missed: bool,
-) -> ControlFlow<()> {
+) -> ControlFlow<Option<Clock>> {
     loop {
         match commands.try_recv() {
             Ok(Command::Shutdown) | Err(mpsc::error::TryRecvError::Disconnected) => {
-                return ControlFlow::Break(());
+                return ControlFlow::Break(None);
             }
+            Ok(Command::SetClock(clock)) => return ControlFlow::Break(Some(clock)),
             Ok(command) => axes.apply(command),
             Err(mpsc::error::TryRecvError::Empty) => break,
         }

@@ -277,8 +277,8 @@ impl Axes {
                     self.finish_deactivation();
                 }
             }
-            // The caller ends the thread.
-            Command::Shutdown => {}
+            // The caller changes the clock or ends the thread.
+            Command::SetClock(_) | Command::Shutdown => {}
         }
     }
 

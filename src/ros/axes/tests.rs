@@ -191,7 +191,7 @@ fn unread_frames_are_dropped_and_counted() {
 #[test]
 fn each_frame_is_published_in_its_own_cycle() {
     const FRAMES: i64 = 5;
-    let TestThread { axes, commands: (commands_out, commands), frames: (frames, mut taken), .. } =
+    let TestThread { mut axes, commands: (commands_out, mut commands), frames: (frames, mut taken), .. } =
         TestThread::new();
     let (found_out, found) = std::sync::mpsc::channel();
     let outputs = async move {
@@ -202,8 +202,8 @@ fn each_frame_is_published_in_its_own_cycle() {
             }
         }
     };
-    let tasks = CooperativeTasks { inputs: Box::pin(std::future::pending()), outputs: Box::pin(outputs) };
-    let thread = std::thread::spawn(move || real::run(axes, commands, &frames, tasks));
+    let mut tasks = CooperativeTasks { inputs: Box::pin(std::future::pending()), outputs: Box::pin(outputs) };
+    let thread = std::thread::spawn(move || real::run(&mut axes, &mut commands, &frames, &mut tasks));
     for instant in 0..FRAMES {
         let found = found.recv_timeout(Duration::from_secs(20)).expect("a frame");
         assert_eq!(found, (instant, 0), "no frame waits");

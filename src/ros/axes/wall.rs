@@ -21,8 +21,12 @@ pub fn origin(mode: TimeMode, period: Nanoseconds) -> Nanoseconds {
 }
 
 fn grid_origin(period: Nanoseconds) -> Nanoseconds {
-    let now = Nanoseconds::try_from(since_epoch().as_nanos()).unwrap_or(Nanoseconds::MAX / 2);
-    (now.div_euclid(period) + 1) * period
+    (now().div_euclid(period) + 1) * period
+}
+
+/// Returns the wall-clock time, ns since the Unix epoch.
+pub(super) fn now() -> Nanoseconds {
+    Nanoseconds::try_from(since_epoch().as_nanos()).unwrap_or(Nanoseconds::MAX / 2)
 }
 
 /// Returns the wall-clock time since the Unix epoch.

@@ -2,7 +2,7 @@
 
 mod clock;
 
-pub use clock::{ClockInput, watch_other_clocks};
+pub use clock::{ClockSubscription, watch_other_clocks};
 
 use std::sync::Arc;
 

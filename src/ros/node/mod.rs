@@ -15,10 +15,12 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
+use futures::FutureExt;
+use tokio::runtime::Handle;
 use tokio::sync::{Mutex, mpsc, watch};
 use tokio::task::JoinSet;
 
-use super::axes::{Health, MotionIds};
+use super::axes::{CooperativeTasks, Health, MotionIds, Pace};
 use super::log::LogRecord;
 use super::publication::{Rosout, publish_diagnostics};
 use super::services::{ParameterServices, check_names};
@@ -147,17 +149,19 @@ async fn serve(
     };
     let (validator, other_clocks) = (tasks.validator(), Arc::default());
     let inputs = tasks.start_inputs(&mut topics, &validator)?;
-    let clock = tasks.start_clock_input(&mut topics)?;
+    let (clock, clock_subscription) = tasks.start_clock(&mut topics)?;
     let (fan_out, actions) = tasks.start_outputs(&mut topics, validator, events, &other_clocks)?;
     let diagnostics = topics.output(&DIAGNOSTICS, OverflowPolicy::Drop)?;
     let screen = start_screen::start_screen(args, &topics, setup.config.name(), setup.mode);
-    let served = tasks.start_services(&node, services, parameters.clone(), &mut join_set)?;
+    let served =
+        tasks.start_services(&node, services, parameters.clone(), clock_subscription, &mut join_set)?;
     let recording = recorder.start()?;
     let status = recording.as_ref().map(TopicRecording::status);
     let text = tasks.diagnostics(&node, other_clocks);
     join_set.spawn(publish_diagnostics(text, diagnostics, health, dropped, status));
     join_set.spawn(NodeTasks::publish_reports(Arc::clone(&tasks.results), reports));
-    let pace = tasks.pace(inputs, fan_out, frames, clock, &mut join_set);
+    let cooperative = CooperativeTasks { inputs, outputs: fan_out.run(frames).boxed() };
+    let pace = Pace { clock, tasks: cooperative, runtime: Handle::current() };
     start_screen::print(&screen);
     if managed.is_some() {
         tasks.deactivate().await;

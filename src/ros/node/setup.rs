@@ -4,7 +4,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use tokio::sync::watch;
 
-use crate::ros::axes::Health;
+use crate::ros::axes::{ClockSource, Health};
 use crate::ros::topics::{OverflowPolicy, RecordError, TopicRecorder};
 use virtual_axes_core::config::{ConfigError, MachineConfig, NodeConfig, Parameters, TimeMode};
 use virtual_axes_core::simulation;
@@ -60,8 +60,8 @@ impl NodeSetup {
         let (mode, health) = (self.mode, health.clone());
         let now = move || {
             let health = health.borrow();
-            let is_before_first_cycle = mode == TimeMode::Fast && health.periods == 0;
-            if mode == TimeMode::Real || is_before_first_cycle {
+            let is_before_first_cycle = mode != TimeMode::SimTime && health.periods == 0;
+            if health.clock.source == ClockSource::Wall || is_before_first_cycle {
                 let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
                 return u64::try_from(since_epoch.as_nanos()).unwrap_or(u64::MAX);
             }

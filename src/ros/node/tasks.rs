@@ -4,10 +4,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 
+use futures::FutureExt;
 use futures::future::{BoxFuture, join, pending};
-use futures::stream::FuturesUnordered;
-use futures::{FutureExt, StreamExt};
-use tokio::runtime::Handle;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::{AbortHandle, JoinSet};
 
@@ -17,17 +15,17 @@ use super::setup::NodeSetup;
 use crate::ros::actions::{
     ActionChannels, ActionServer, GoalHandler, ProgramGoals, ShutdownHandle, TrajectoryGoals,
 };
-use crate::ros::axes::{
-    ClockState, Command, CooperativeTasks, Health, MotionIds, Pace, SampleFrame, SimulationReport,
-};
+use crate::ros::axes::{Clock, Command, Health, MotionIds, SimulationReport};
 use crate::ros::inputs::{
-    ClockInput, PsecInput, receive_feed_overrides, receive_loads, receive_stream, watch_other_clocks,
+    ClockSubscription, PsecInput, receive_feed_overrides, receive_loads, receive_stream, watch_other_clocks,
 };
 use crate::ros::publication::{
     Diagnostics, FanOut, FeedbackOutput, ProgramFeedbackOutput, ToolOutput, feedback_period,
 };
 use crate::ros::results::{GoalEvent, TrajectoryResults};
-use crate::ros::services::{NodeParameterHost, ParameterServices, QueryStateService, TriggerService};
+use crate::ros::services::{
+    NodeParameterHost, ParameterServices, QueryStateService, SetClock, TriggerService,
+};
 use crate::ros::topics::{EndpointError, TopicFactory};
 use crate::ros_interface::{
     CLOCK, CLOCK_INPUT, CONTROLLER_STATE, CYCLE_START, DRIVE_STATES, FEED_HOLD, JOINT_STATES, LOAD,
@@ -76,6 +74,22 @@ pub(super) fn create_results(
     Ok((results, GoalEvents { trajectories, programs }))
 }
 
+/// Returns the change of the clock of a running node.
+fn clock_change(mut clock: ClockSubscription, commands: mpsc::Sender<Command>) -> SetClock {
+    Box::new(move |is_followed| {
+        let permit = commands.try_reserve();
+        let permit = permit.map_err(|_| "the queue of commands is full; repeat the request")?;
+        if is_followed {
+            permit.send(Command::SetClock(Clock::Ros(Some(clock.subscribe()?))));
+        } else {
+            // Before the end of the followed clock, which ends the axes' thread.
+            permit.send(Command::SetClock(Clock::Wall));
+            clock.end();
+        }
+        Ok(())
+    })
+}
+
 impl NodeTasks<'_> {
     /// Starts the inputs `psec` and `~/speed_scaling_input`. Returns the reception of streamed setpoints and loads, which
     /// does not end.
@@ -103,19 +117,19 @@ impl NodeTasks<'_> {
         Ok(join(stream, loads).then(|_| pending()).boxed())
     }
 
-    /// Starts the input `/clock` with `use_sim_time`. Returns the state of the clock.
-    pub(super) fn start_clock_input(
+    /// Returns the clock of the start, and the subscription of `/clock`, which begins with `use_sim_time`.
+    pub(super) fn start_clock(
         &self,
         topics: &mut TopicFactory<'_>,
-    ) -> Result<Option<watch::Receiver<ClockState>>, EndpointError> {
-        if self.setup.mode != TimeMode::SimTime {
-            return Ok(None);
-        }
-        let subscription = topics.subscription(&CLOCK_INPUT)?;
-        let (state, clock) = watch::channel(ClockState::default());
-        let (node, period) = (topics.node.clone(), self.setup.period);
-        topics.tasks.spawn(ClockInput { subscription, node, period, state }.run());
-        Ok(Some(clock))
+    ) -> Result<(Clock, ClockSubscription), EndpointError> {
+        let name = self.args.resolve_topic(CLOCK_INPUT.name).unwrap_or_else(|_| CLOCK_INPUT.name.to_owned());
+        let mut subscription = ClockSubscription::new(topics.node.clone(), name, self.setup.period);
+        let clock = match self.setup.mode {
+            TimeMode::Real => Clock::Wall,
+            TimeMode::Fast => Clock::Ros(None),
+            TimeMode::SimTime => Clock::Ros(Some(subscription.follow(topics.subscription(&CLOCK_INPUT)?))),
+        };
+        Ok((clock, subscription))
     }
 
     /// Creates the outputs of the frames, and starts both action servers with their feedback among these outputs; in
@@ -221,6 +235,7 @@ impl NodeTasks<'_> {
         node: &Node,
         parameter_services: ParameterServices,
         parameters: Parameters,
+        clock: ClockSubscription,
         tasks: &mut JoinSet<()>,
     ) -> Result<AbortHandle, NodeError> {
         let commands = self.commands.clone();
@@ -241,7 +256,9 @@ impl NodeTasks<'_> {
         tasks.spawn(query_state.serve(self.setup.joints.clone(), self.commands.clone()));
         let health = self.health.clone();
         let now = move || stamp(health.borrow().time);
-        let mut host = NodeParameterHost::new(parameters, self.commands.clone(), Arc::clone(&self.live));
+        let set_clock = clock_change(clock, self.commands.clone());
+        let mut host =
+            NodeParameterHost::new(parameters, self.commands.clone(), Arc::clone(&self.live), set_clock);
         Ok(tasks.spawn(async move { parameter_services.serve(&mut host, now, pending()).await }))
     }
 
@@ -251,11 +268,6 @@ impl NodeTasks<'_> {
             node: self.args.node().to_string(),
             machine: self.setup.config.name().to_owned(),
             joints: self.setup.joints.clone(),
-            time_mode: match self.setup.mode {
-                TimeMode::Real => "real",
-                TimeMode::Fast => "fast",
-                TimeMode::SimTime => "sim",
-            },
             endpoints: node.endpoint_counts(),
             other_clocks,
         }
@@ -268,31 +280,6 @@ impl NodeTasks<'_> {
     ) {
         while let Some(report) = reports.recv().await {
             results.publish(report).await;
-        }
-    }
-
-    /// Returns the pacing of the axes' thread. In real time the thread polls `inputs` and `outputs` itself, otherwise
-    /// another thread does.
-    pub(super) fn pace(
-        &self,
-        inputs: BoxFuture<'static, ()>,
-        fan_out: FanOut,
-        frames: mpsc::Receiver<Arc<SampleFrame>>,
-        followed: Option<watch::Receiver<ClockState>>,
-        tasks: &mut JoinSet<()>,
-    ) -> Pace {
-        let outputs = fan_out.run(frames).boxed();
-        match self.setup.mode {
-            TimeMode::Real => Pace::Real(CooperativeTasks { inputs, outputs }),
-            TimeMode::Fast | TimeMode::SimTime => {
-                // A separate thread, because the publication may wait for subscribers. It ends with the frames.
-                let futures = FuturesUnordered::from_iter([outputs, inputs]);
-                let runtime = Handle::current();
-                tasks.spawn_blocking(move || {
-                    let _ = runtime.block_on(futures.into_future());
-                });
-                Pace::Clock { followed, runtime: Handle::current() }
-            }
         }
     }
 

@@ -30,8 +30,6 @@ pub struct Diagnostics {
     pub machine: String,
     /// Names of the joints, with prefix.
     pub joints: Vec<String>,
-    /// Time mode: `real`, `fast` or `sim`.
-    pub time_mode: &'static str,
     /// Counts of remote endpoints.
     pub endpoints: EndpointCounts,
     /// Number of other publishers of `/clock` in `fast`.
@@ -98,7 +96,7 @@ impl Diagnostics {
         let values = vec![
             value(keys::STATE, state),
             value(keys::FEED_OVERRIDE, Rounded(now.feed_rate)),
-            value(keys::TIME, self.time_mode),
+            value(keys::TIME, time_mode(now.clock.source)),
             value(keys::CLOCK, now.clock.source.name()),
             value(keys::CLOCK_JUMPS, now.clock.jumps),
             value(keys::BEHIND_CLOCK_MS, now.clock.behind as f64 / MILLISECOND_NS as f64),
@@ -158,6 +156,15 @@ fn node_problems(before: &Health, now: &Health, dropped: u64) -> Vec<&'static st
         (now.clock.jumps > before.clock.jumps, "the clock jumped"),
     ];
     conditions.into_iter().filter_map(|(is_present, text)| is_present.then_some(text)).collect()
+}
+
+/// Returns the parameter `time` that has the clock of this source; before its first message a clock is followed.
+fn time_mode(source: ClockSource) -> &'static str {
+    match source {
+        ClockSource::Wall => "real",
+        ClockSource::Own => "fast",
+        ClockSource::Followed | ClockSource::None => "sim",
+    }
 }
 
 /// Returns the state of the node if `periods` position cycles were released since the previous message.
@@ -220,7 +227,6 @@ mod tests {
             node: "/virtual_axes".into(),
             machine: "m".into(),
             joints: vec!["x".into()],
-            time_mode: "real",
             endpoints: EndpointCounts::default(),
             other_clocks: Arc::default(),
         };
@@ -239,7 +245,6 @@ mod tests {
             node: "/virtual_axes".into(),
             machine: "m".into(),
             joints: vec!["x".into()],
-            time_mode: "real",
             endpoints: EndpointCounts::default(),
             other_clocks: Arc::default(),
         };

@@ -10,7 +10,7 @@ mod trigger;
 
 pub use create::{ServiceError, ServiceNameConflict, check_names};
 pub use lifecycle::{LifecycleServer, RequestedTransition, TransitionRequest};
-pub use parameter_host::{NodeParameterHost, UnconfiguredParameterHost};
+pub use parameter_host::{NodeParameterHost, SetClock, UnconfiguredParameterHost};
 pub use parameters::ParameterServices;
 pub use query_state::QueryStateService;
 pub use trigger::TriggerService;

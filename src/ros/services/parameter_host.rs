@@ -10,22 +10,28 @@ use crate::validation::parameters::{
 };
 use virtual_axes_core::config::Parameters;
 
+/// Function that changes the clock of a running node: to `/clock` if true, else to the wall clock. Its error is a reason.
+pub type SetClock = Box<dyn FnMut(bool) -> Result<(), String> + Send>;
+
 /// Parameter host that validates changes against the schema and sends them to the simulation.
 pub struct NodeParameterHost {
     store: ParameterStore,
     commands: mpsc::Sender<Command>,
     /// Permit for the command of the next change.
     permit: Option<mpsc::OwnedPermit<Command>>,
+    set_clock: SetClock,
 }
 
 impl NodeParameterHost {
-    /// Creates a host of `parameters` that sends changes to `commands` and stores them in `live`.
+    /// Creates a host of `parameters` that sends changes to `commands` and stores them in `live`; `set_clock`
+    /// follows `use_sim_time`.
     pub fn new(
         parameters: Parameters,
         commands: mpsc::Sender<Command>,
         live: Arc<LiveNodeParameters>,
+        set_clock: SetClock,
     ) -> Self {
-        NodeParameterHost { store: ParameterStore::new(parameters, live), commands, permit: None }
+        NodeParameterHost { store: ParameterStore::new(parameters, live), commands, permit: None, set_clock }
     }
 }
 
@@ -53,6 +59,10 @@ impl ParameterHost for NodeParameterHost {
         // The design of a predictive controller takes long; other tasks continue meanwhile.
         let (changed, machine) = tokio::task::block_in_place(|| self.store.check(changes))?;
         let permit = self.permit.take().ok_or("the node is shutting down")?;
+        let uses_sim_time = changed.node_config().use_sim_time;
+        if uses_sim_time != self.store.parameters().node_config().use_sim_time {
+            (self.set_clock)(uses_sim_time)?;
+        }
         permit.send(Command::UpdateParameters(Arc::new(machine)));
         self.store.replace(changed);
         Ok(())

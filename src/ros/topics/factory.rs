@@ -29,6 +29,15 @@ pub struct TopicInput<M: DeserializeOwned + 'static> {
 }
 
 impl<M: Recorded + DeserializeOwned + Send + Sync + 'static> TopicInput<M> {
+    /// Creates a subscription of a running node, which is not recorded; `name` is the resolved name.
+    ///
+    /// # Errors
+    /// Reason of the middleware.
+    pub fn create(node: &Node, topic: &Topic, name: String, qos: QosConfig) -> Result<Self, String> {
+        let network = node.create_subscription(&name, &topic.type_name(), &profile(qos))?;
+        Ok(TopicInput { network, latched: None, tap: Tap::none(), name })
+    }
+
     /// Returns the messages in order of reception and records them.
     pub fn messages(&self) -> impl Stream<Item = Result<(M, MessageInfo), String>> + Send + '_ {
         let latched = stream::iter(&self.latched).flat_map(|latched| latched.messages());

@@ -14,9 +14,6 @@ use virtual_axes_core::text::shortened;
 /// parameter set alone requires a validation of the whole machine.
 const MAX_CHANGES: usize = 1000;
 
-/// Parameter that selects the clock.
-const USE_SIM_TIME: &str = "use_sim_time";
-
 /// Rejects a request with too many parameters.
 ///
 /// # Errors
@@ -111,13 +108,8 @@ impl ParameterStore {
         // The present value is accepted, as in a file of `ros2 param dump`.
         let changed = |(key, value): &&(String, ParameterValue)| self.get(key).as_ref() != Some(value);
         if let Some((key, _)) = changes.iter().filter(changed).find(|(key, _)| is_fixed(key)) {
-            let reason = if key == USE_SIM_TIME {
-                ": the clock, by which axes and grid of the position cycles are started"
-            } else {
-                ""
-            };
             return Err(format!(
-                "{key} cannot be set while the node runs{reason}; set it at the start with -p or --params-file"
+                "{key} cannot be set while the node runs; set it at the start with -p or --params-file"
             ));
         }
         self.check_all(changes)

@@ -47,7 +47,7 @@ parameters! {
         pub interpolates: bool = choice("interpolation_method", &["splines", "none"]).default(Text("splines"))
             => |values, rows| Some(String::read(values, rows)? == "splines");
         /// Use the time of the topic /clock.
-        pub use_sim_time: bool = flag("use_sim_time").default(Flag(false));
+        pub use_sim_time: bool = flag("use_sim_time").default(Flag(false)).live();
         /// Folder of the part programs that ~/run_program runs by their path, with its subfolders; empty: built-in programs and
         /// texts only. It is set at the start, also of a managed node.
         pub program_folder: Option<PathBuf> = text("program_folder").default(Text(""));
