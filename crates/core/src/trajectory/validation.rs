@@ -48,7 +48,7 @@ impl Trajectory {
     ///
     /// # Errors
     /// The first violation found, with code, joint, point, value and limit.
-    pub fn new(request: TrajectoryRequest, context: &ValidationContext<'_>) -> Result<Self, Rejection> {
+    pub fn new(mut request: TrajectoryRequest, context: &ValidationContext<'_>) -> Result<Self, Rejection> {
         if request.points() > context.max_points {
             let (found, limit) = (request.points(), context.max_points);
             return Err(Rejection::new(
@@ -59,6 +59,11 @@ impl Trajectory {
         }
         let joints = find_joints(&request.joints, context.joints)?;
         request.check_times()?;
+        if !context.allow_nonzero_end_velocity {
+            let last = request.velocities.iter_mut().rev().take(joints.len());
+            last.filter(|velocity| velocity.abs() <= MAX_RESIDUAL_VELOCITY)
+                .for_each(|velocity| *velocity = 0.0);
+        }
         let trajectory = Self::new_unchecked(request, joints, context.joints);
         check_limits(&trajectory, context)?;
         Ok(trajectory)
@@ -126,7 +131,7 @@ impl ColumnCheck<'_> {
     fn end(&self, allow_nonzero_velocity: bool) -> Result<(), Rejection> {
         let last = self.trajectory.points() - 1;
         let velocity = self.trajectory.point(self.column, last).velocity;
-        if velocity.abs() <= MAX_RESIDUAL_VELOCITY || allow_nonzero_velocity {
+        if velocity == 0.0 || allow_nonzero_velocity {
             return Ok(());
         }
         let (name, unit) = (&self.joint.name, self.joint.unit());
