@@ -102,6 +102,22 @@ def first_participant() -> Iterator[Node]:
         yield node
 
 
+@contextlib.contextmanager
+def matched_sender(domain_id: int) -> Iterator[Callable[[bytes], None]]:
+    """Yields a function that sends datagrams of a forged participant whose endpoints the node has matched."""
+    with (
+        sender(domain_id, DISCOVERY_PORT) as send,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as forged,
+    ):
+        forged.bind(("127.0.0.1", 0))
+        forged.settimeout(20.0)
+        send(announcement(port=forged.getsockname()[1]))
+        # The node sends to the announced address when it has matched the endpoints.
+        assert forged.recv(1 << 16).startswith(b"RTPS")
+        time.sleep(0.5)
+        yield send
+
+
 def assert_rate_is_kept(drive: AxesClient, start: int, seconds: float) -> None:
     end = start + round(seconds * NANOSECONDS)
     drive.wait_until(end, seconds + 10)
@@ -122,16 +138,7 @@ def test_two_datagrams_take_no_memory(hostile: list[bytes]) -> None:
     with first_participant() as node, AxesClient(process=node) as drive:
         before = resident_mb(node.pid)
         began = drive.now()
-        with (
-            sender(node.domain_id, DISCOVERY_PORT) as send,
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as forged,
-        ):
-            forged.bind(("127.0.0.1", 0))
-            forged.settimeout(20.0)
-            send(announcement(port=forged.getsockname()[1]))
-            # The node sends to the announced address when it has matched the endpoints.
-            assert forged.recv(1 << 16).startswith(b"RTPS")
-            time.sleep(0.5)
+        with matched_sender(node.domain_id) as send:
             for datagram in hostile:
                 send(datagram)
         assert_rate_is_kept(drive, began, 3.0)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -19,7 +18,7 @@ from launch_ros.actions import Node as NodeAction
 
 from launch_graph import nodes
 from node_process import Node, status_of
-from test_hostile_datagrams import DISCOVERY_PORT, START_SCREEN_END, announcement, fragment, sender
+from test_hostile_datagrams import START_SCREEN_END, fragment, matched_sender
 from virtual_axes_py.ros import AxesClient
 
 ONE = "virtual_axes.launch.py"
@@ -142,15 +141,7 @@ def test_a_node_that_exceeds_its_memory_limit_is_restarted(machine: Path) -> Non
             print(f"\nlimit {limit} MB, at most {peak_mb:.0f} MB before")
             assert peak_mb < limit
             drive.process = None
-            with (
-                sender(supervisor.process.domain_id, DISCOVERY_PORT) as send,
-                socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as forged,
-            ):
-                forged.bind(("127.0.0.1", 0))
-                forged.settimeout(20.0)
-                send(announcement(port=forged.getsockname()[1]))
-                assert forged.recv(1 << 16).startswith(b"RTPS")
-                time.sleep(0.5)
+            with matched_sender(supervisor.process.domain_id) as send:
                 for sample in range(1, 3):
                     with contextlib.suppress(ConnectionError):
                         send(fragment(sample, SAMPLE_MB << 20))
