@@ -8,6 +8,7 @@
     tools/measure.py publish-once --runs 200        trajectories of publishers that publish at the match and leave
     tools/measure.py restart                        times until participants that stay reach a restarted node
     tools/measure.py simultaneous-start --trials 200  processes that start at the same time as nodes
+    tools/measure.py churn --minutes 60             memory that each participant costs which has come and gone
 
 The share is the CPU time of all threads over wall-clock time, of one core. Latencies are in position cycles; the axis
 moves after the pure delay of the simulated drive. The exit status is 1 if a trajectory or an endpoint was lost. No
@@ -28,13 +29,17 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import rclpy
+from rclpy.context import Context
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState
 
 import options
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test_py"))
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-from node_process import Node, resident_mb  # noqa: E402
+from node_process import Node, own_mb, resident_mb  # noqa: E402
 from participant import Participant  # noqa: E402
 from simultaneous_start import Trial, expected_endpoints  # noqa: E402
 from virtual_axes_py.ros import TSP_NS, AxesClient, ballbar, joint_trajectory  # noqa: E402
@@ -55,6 +60,12 @@ STEP, MOVED = 2e-3, 1e-7
 REST_S = 0.4
 """Time until the axis is at rest again, s."""
 GAIN = "x.velocity_loop.gain"
+FIRST_VISITS = 40
+"""Participants before the first look at the memory, which fill the pools of the middleware."""
+CHURN_STEP_MINUTES = 5
+"""Time between two looks at the memory."""
+LEASE_S = 25.0
+"""Time in which killed participants are forgotten, with a margin, s."""
 
 
 def cpu_seconds(process: Node) -> float:
@@ -239,6 +250,56 @@ def simultaneous_start(args: argparse.Namespace) -> bool:
     return complete == args.trials
 
 
+def visit(domain_id: int) -> None:
+    """Runs a participant with a subscription and a publisher for half a second."""
+    context = Context()
+    rclpy.init(context=context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
+    visitor = rclpy.create_node("visitor", context=context)
+    visitor.create_subscription(JointState, "/joint_states", lambda _: None, 10)
+    visitor.create_publisher(JointState, "/load", 10)
+    time.sleep(0.5)
+    visitor.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+def resources(process: Node) -> tuple[float, int, int]:
+    """Returns the mean private memory over 10 s, MB, and the number of open files and of threads."""
+    memory = []
+    for _ in range(40):
+        memory.append(own_mb(process.pid))
+        time.sleep(0.25)
+    folder = Path(f"/proc/{process.pid}")
+    return float(np.mean(memory)), len(os.listdir(folder / "fd")), len(os.listdir(folder / "task"))
+
+
+def churn(args: argparse.Namespace) -> bool:
+    """Prints the memory that participants cost which come and go; every tenth is killed."""
+    with Node(REAL) as process, AxesClient(process=process, keep_samples=False) as drive:
+        for _ in range(FIRST_VISITS):
+            visit(process.domain_id)
+        count, rows = 0, []
+        for minute in range(0, args.minutes + 1, CHURN_STEP_MINUTES):
+            deadline = time.monotonic() + 60 * CHURN_STEP_MINUTES * (minute > 0)
+            while time.monotonic() < deadline:
+                if count % 10 == 9:
+                    with Participant(process.domain_id, "sink", 10) as killed:
+                        killed.kill()
+                else:
+                    visit(process.domain_id)
+                count += 1
+                time.sleep(2.0)
+            time.sleep(LEASE_S)
+            endpoints = int(drive.next_status()["endpoints_discovered"])
+            rows.append((count, endpoints, *resources(process)))
+            print("{} participants, {} endpoints: {:.2f} MB, {} files, {} threads".format(*rows[-1]), flush=True)
+    (first, before, start_mb, *start), (last, after, end_mb, *end) = rows[0], rows[-1]
+    print(
+        f"{1e3 * (end_mb - start_mb) / max(last - first, 1):.1f} kB for each participant, "
+        f"{1e3 * (end_mb - start_mb) / max(after - before, 1):.2f} kB for each endpoint"
+    )
+    return start == end
+
+
 def main() -> int:
     """Runs a measurement; returns the exit status."""
     parser = options.parser(__doc__)
@@ -264,6 +325,7 @@ def main() -> int:
     once.add_argument("--durability", choices=["transient_local", "volatile"], default="transient_local")
     add(restart, ("--runs", options.whole, 10))
     add(simultaneous_start, ("--trials", options.whole, 42))
+    add(churn, ("--minutes", options.whole, 60))
     args = parser.parse_args()
     return int(not args.function(args))
 

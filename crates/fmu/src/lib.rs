@@ -16,6 +16,7 @@
 
 #![allow(non_snake_case)]
 
+mod archive;
 mod border;
 mod description;
 mod documentation;
@@ -30,6 +31,7 @@ mod units;
 mod value_functions;
 mod variables;
 
+pub use archive::fmu_archive;
 pub use border::{Fmi2Callbacks, Fmi2Logger, Fmi2Status};
 pub use description::{MODEL_IDENTIFIER, guid, model_description};
 pub use documentation::documentation;

@@ -9,7 +9,9 @@
 mod contour;
 mod convert;
 mod design;
+mod fmu;
 mod identification;
+mod limit_audit;
 mod machine;
 mod machine_methods;
 mod setpoints;
@@ -30,7 +32,11 @@ mod _native {
     #[pymodule_export]
     use super::design::{PyPredictionModel, PyRst};
     #[pymodule_export]
+    use super::fmu::fmu;
+    #[pymodule_export]
     use super::identification::{PyIdentification, identify};
+    #[pymodule_export]
+    use super::limit_audit::check;
     #[pymodule_export]
     use super::machine::{PyMachine, machine_names};
     #[pymodule_export]

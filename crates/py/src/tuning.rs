@@ -21,7 +21,7 @@ use crate::machine::PyMachine;
 use crate::simulate::Given;
 
 /// Path with its name and description.
-type NamedPath<'py> = (String, String, Given<'py>);
+pub type NamedPath<'py> = (String, String, Given<'py>);
 
 /// Options of the search, a dictionary.
 #[derive(FromPyObject)]

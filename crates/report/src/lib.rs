@@ -33,6 +33,7 @@ mod extent;
 mod figure_json;
 mod html;
 pub mod identification;
+pub mod limit_audit;
 mod report;
 pub mod runs;
 mod table;

@@ -161,7 +161,7 @@ fn main() -> ExitCode {
                 print_error(invalid);
                 return ExitCode::from(INVALID_RESULT);
             }
-            if let Some(excess) = error.downcast_ref::<check::limit_audit::LimitExcess>() {
+            if let Some(excess) = error.downcast_ref::<check::limit_audit_output::LimitExcess>() {
                 let _ = io::stdout().write_all(excess.text.as_bytes());
                 print_error(excess);
                 return ExitCode::from(BEYOND_LIMITS);

@@ -22,7 +22,9 @@ from . import design
 from ._native import PartProgram, Rst, Scenario, __version__, machine_names, nc_program_names, scenario_names
 from .arguments import to_path
 from .chunks import SweepResult
+from .design import frequency_response as bode
 from .design import plot_bode
+from .export import CheckResult, check, fmu
 from .identification import Identification, identify
 from .machine import SIGNALS, TOOL_SIGNALS, Machine
 from .optimization import Optimum, optimize
@@ -35,6 +37,7 @@ from .tuning import LearningResult, RobustnessResult, TuningResult, learn, robus
 __all__ = [
     "SIGNALS",
     "TOOL_SIGNALS",
+    "CheckResult",
     "Circle",
     "Identification",
     "LearningResult",
@@ -50,7 +53,10 @@ __all__ = [
     "SweepResults",
     "TuningResult",
     "__version__",
+    "bode",
+    "check",
     "design",
+    "fmu",
     "identify",
     "learn",
     "machine_names",
@@ -66,6 +72,11 @@ __all__ = [
     "sweep",
     "tune",
 ]
+
+
+def __dir__() -> list[str]:
+    """Returns the public names."""
+    return __all__
 
 
 def scenario(name_or_path: str | os.PathLike[str], feed: float | None = None) -> Scenario:

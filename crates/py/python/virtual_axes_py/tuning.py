@@ -94,7 +94,7 @@ def tune(
         "seed": 1 if seed is None else seed,
         "designs": designs,
     }
-    paths = [_named(machine, one, f"path {index + 1}") for index, one in enumerate([psec, *also])]
+    paths = [named_path(machine, one, f"path {index + 1}") for index, one in enumerate([psec, *also])]
     text, tuned = _native.tune(to_native(machine), paths[0], paths[1:], options)
     return TuningResult(Machine(tuned), json.loads(text))
 
@@ -128,7 +128,7 @@ def robustness(machine: Machine, psec: Setpoints, *, by: float = 0.3, cost: str 
     `psec` is the path, as for `Machine.simulate`, `by` the relative deviation, 0 … 0.8, and `cost` that of `tune`.
     Raises `ValueError` with the command's text for an option out of range. Releases the global interpreter lock.
     """
-    path = _named(machine, psec, "path 1")
+    path = named_path(machine, psec, "path 1")
     return RobustnessResult(json.loads(_native.robustness(to_native(machine), path, by, cost)))
 
 
@@ -189,11 +189,11 @@ def learn(
         "encoder_step_um": encoder_step_um,
         "acceleration_excess": acceleration_excess,
     }
-    text, compensated = _native.learn(to_native(machine), _named(machine, psec, "path 1"), options)
+    text, compensated = _native.learn(to_native(machine), named_path(machine, psec, "path 1"), options)
     return LearningResult(compensated, json.loads(text))
 
 
-def _named(machine: Machine, psec: Setpoints, name: str) -> tuple[str, str, Any]:
+def named_path(machine: Machine, psec: Setpoints, name: str) -> tuple[str, str, Any]:
     """Returns setpoints with their name and description."""
     if isinstance(psec, _native.Scenario):
         return psec.name, psec.description, psec

@@ -1,6 +1,5 @@
 //! `virtual_axes check`: validation of machine files, scenarios, setpoints and part programs.
 
-pub mod limit_audit;
 pub mod limit_audit_output;
 pub mod program_check;
 
@@ -10,7 +9,7 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use serde_json::json;
+use virtual_axes_core::assess::LimitAudit;
 use virtual_axes_core::config::{AxisKind, DEFAULT_MACHINE, MachineConfig, Parameters};
 use virtual_axes_core::machine::MachineParameters;
 use virtual_axes_core::path::Program;
@@ -28,8 +27,9 @@ use crate::input::setpoint_summary::SetpointSummary;
 use crate::input::{CommandInput, program_text};
 use crate::output::progress::TrialProgress;
 use crate::output::{interrupt, print_error};
-use limit_audit::{LimitAudit, LimitExcess};
+use limit_audit_output::LimitExcess;
 use row_audit::RowAudit;
+use virtual_axes_report::limit_audit;
 use virtual_axes_report::runs::axis_warnings;
 
 /// Arguments of `virtual_axes check`.
@@ -241,16 +241,9 @@ impl AuditedInput<'_> {
     /// Returns the output of the command, in [`LimitExcess`] if a limit is exceeded.
     fn result(&self, mut audit: LimitAudit, as_json: bool) -> Result<String, Box<dyn Error>> {
         audit.finish();
-        let excess = limit_audit_output::excess(&audit);
+        let excess = limit_audit::excess(&audit);
         let text = if as_json {
-            let object = json!({
-                "input": self.name,
-                "machine": self.machine,
-                "duration_s": self.duration,
-                "within_limits": excess.is_none(),
-                "axes": limit_audit_output::json(&audit),
-                "notes": limit_audit_output::notes(&audit),
-            });
+            let object = limit_audit::json(&audit, self.name, self.machine, self.duration);
             format!("{object:#}\n")
         } else {
             let verdict = if excess.is_none() { "valid" } else { "beyond limits" };

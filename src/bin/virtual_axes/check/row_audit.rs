@@ -1,9 +1,8 @@
 //! Limit audit of the rows of a CSV file, at their own times and with the rounding of their digits.
 
+use virtual_axes_core::assess::LimitAudit;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_io::files::PsecRow;
-
-use crate::check::limit_audit::LimitAudit;
 
 /// Number of rows that determine the digits of a column before differences are computed.
 const DIGIT_ROWS: usize = 1000;

@@ -1,13 +1,10 @@
-//! Limit audit of `virtual_axes check`: position, velocity, acceleration and jerk of setpoints against the limits of the
+//! Limit audit: position, velocity, acceleration and jerk of setpoints against the limits of the
 //! axes.
 
-use std::error::Error;
-use std::fmt;
-
-use virtual_axes_core::config::{AxisKind, LimitsConfig, MachineConfig};
-use virtual_axes_core::path::LimitUse;
-use virtual_axes_core::trajectory::limits::TRAVEL_TOLERANCE;
-use virtual_axes_core::units::{Nanoseconds, seconds};
+use crate::config::{AxisKind, LimitsConfig, MachineConfig};
+use crate::path::LimitUse;
+use crate::trajectory::limits::TRAVEL_TOLERANCE;
+use crate::units::{Nanoseconds, seconds};
 
 /// Setpoints of an axis that are kept for differences.
 const WINDOW: usize = LimitUse::WINDOW;
@@ -218,27 +215,10 @@ impl LimitAudit {
     }
 }
 
-/// Setpoints beyond a limit, with the output of the command.
-#[derive(Debug)]
-pub struct LimitExcess {
-    /// Output of the command.
-    pub text: String,
-    /// File, place and limit.
-    pub reason: String,
-}
-
-impl fmt::Display for LimitExcess {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.reason)
-    }
-}
-
-impl Error for LimitExcess {}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use virtual_axes_core::config::Parameters;
+    use crate::config::Parameters;
 
     const PERIOD: Nanoseconds = 6_000_000;
 
