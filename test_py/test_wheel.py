@@ -244,7 +244,7 @@ def test_the_setup_of_a_part_program_shifts_the_part_and_adds_its_times(tmp_path
             ValueError,
             "other periods",
         ),
-        (lambda m: m.simulate({}), ValueError, "psec has no columns; it needs one or more of x, y"),
+        (lambda m: m.simulate({}), ValueError, "psec has no column of an axis; it needs one or more of x, y"),
         (lambda m: va.scenario("nothing"), ValueError, "nothing"),
         (lambda m: m.simulate(va.nc_program("/nowhere.nc")), ValueError, "/nowhere.nc"),
         (lambda m: va.nc_program("a.nc", feed_override=3.0), ValueError, "feed_override 3"),

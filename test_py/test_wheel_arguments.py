@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
@@ -67,6 +68,34 @@ def machine() -> va.Machine:
         (lambda m: va.random_variants(1, 1, {"x.position_loop.gain": ("a", "b")}), TypeError, "must be two numbers"),
         (lambda m: va.random_variants(1, 1, {"x.position_loop.gain": (0, 10**30)}), ValueError, "1e.18 in amount"),
         (lambda m: va.random_variants(1, 1.5, {}), TypeError, "n 1.5"),
+        (lambda m: va.Machine(3), TypeError, r"native is of type int; Machine.load\(name_or_path\)"),
+        (lambda m: m.with_("x"), TypeError, "changes is of type str; it must be a dictionary"),
+        (lambda m: m.simulate({"time": [0.0, 1.0]}), ValueError, "psec has no column of an axis; it needs one or more"),
+        (lambda m: va.Stepper(m).step("a"), TypeError, "psec is 'a'; it must have numbers"),
+        (lambda m: va.Stepper(m).set_load(["a"] * 5), TypeError, "load has elements of type <U1"),
+        (lambda m: va.Stepper(m).step(np.zeros(5), "a"), TypeError, "preview is 'a'; it must have numbers"),
+        (lambda m: va.design.rst(25.0, [1.0], [25.0]), ValueError, r"r has the shape \(\); it needs one dimension"),
+        (lambda m: va.design.rst([25.0], ["a"], [25.0]), TypeError, "s has elements of type <U1"),
+        (lambda m: va.design.rst([1.0], [1.0], [1.0], 0.5), TypeError, "t_first 0.5: must be an integer"),
+        (lambda m: va.design.gpc(m, 12, lambda_rel=0.1), TypeError, "model is of type Machine; it must be a Predict"),
+        (lambda m: va.design.gpc(va.design.model(m, "x"), 12, lambda_rel="a"), TypeError, "lambda_rel is 'a'"),
+        (lambda m: va.design.pid(va.design.model(m, "x"), "a"), TypeError, "gain is 'a'; it must be a real number"),
+        (lambda m: va.design.place_poles(va.design.model(m, "x"), 0.5), TypeError, "poles is 0.5; it must be a list"),
+        (lambda m: va.design.margins(va.design.model(m, "x"), 25.0), TypeError, "rst is of type float; it must be an"),
+        (lambda m: va.design.poles(m, None), TypeError, "model is of type Machine"),
+        (lambda m: va.design.to_control(3), TypeError, "model is of type int"),
+        (lambda m: va.scenario("ballbar", feed="a"), TypeError, "feed is 'a'; it must be a real number"),
+        (lambda m: va.nc_program("pocket", "a"), TypeError, "feed_override is 'a'; it must be a real number"),
+        (
+            lambda m: va.nc_program("pocket", work_offset={"G54": 3}),
+            ValueError,
+            r"work_offset of G54 has the shape \(\)",
+        ),
+        (lambda m: va.nc_program("pocket", work_offset={"G54": (1, 2)}), ValueError, "has 2 values; it must have X, Y"),
+        (lambda m: va.nc_program("pocket", work_offset={"G54": [0.0] * 7}), ValueError, "has 7 values; it must have X"),
+        (lambda m: va.nc_program("pocket", tools={1: 0.05}), ValueError, r"tools: tool 1 has the shape \(\)"),
+        (lambda m: va.nc_program("pocket", tools={1: (0.05,)}), ValueError, "tool 1 has 1 values; it must have length"),
+        (lambda m: va.identify(3, "x"), TypeError, "recording is of type int; it must be a path, a dictionary"),
     ],
 )
 def test_a_wrong_argument_is_named(call, error, text: str, machine: va.Machine) -> None:
@@ -166,14 +195,15 @@ def test_ctrl_c_ends_a_long_call_within_2_seconds(name: str) -> None:
         time.sleep(1.5)
         assert process.poll() is None
         process.send_signal(signal.SIGINT)
-        start = time.monotonic()
+        # Seconds of a thread that is always ready to run: other load stretches them as much as those of the call.
+        start = time.thread_time()
+        while process.poll() is None:
+            assert time.thread_time() - start < 2.0
         _, errors = process.communicate(timeout=60)
-        duration = time.monotonic() - start
     finally:
         process.kill()
         process.wait(timeout=10)
     assert process.returncode != 0 and errors.rstrip().endswith("KeyboardInterrupt"), errors
-    assert duration < 2.0
 
 
 @pytest.mark.parametrize(
@@ -217,3 +247,26 @@ def test_a_part_program_of_a_sweep_needs_no_file_at_the_workers(machine: va.Mach
     found = va.sweep(machine, [{"x.position_loop.gain": 2.0}], program)
     alone = machine.with_({"x.position_loop.gain": 2.0}).simulate(program, figures="axes")
     assert found[0].figures == alone.figures
+
+
+def test_an_error_of_the_identification_names_arguments(machine: va.Machine) -> None:
+    table = np.zeros(50, dtype=[("t_ms", float), ("position", float)])
+    with pytest.raises(ValueError, match='no column "clock".*by column CHANNEL=.* or give the .* by rate_hz') as found:
+        va.identify(table, "x", machine, column="time=clock[ms]")
+    assert "--" not in str(found.value)
+
+
+def test_one_code_without_effect_needs_no_list(machine: va.Machine, tmp_path: Path) -> None:
+    file = tmp_path / "part.nc"
+    file.write_text("G21 G90 G94\nM7\nG1 X20 F3000\nM30\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        machine.simulate(va.nc_program(file))
+    for ignored in (7, "M7", [7]):
+        with pytest.warns(UserWarning, match="M7 is ignored"):
+            machine.simulate(va.nc_program(file, ignore=ignored))
+
+
+def test_the_module_lists_its_public_names_only() -> None:
+    names = set(dir(va))
+    assert {"Machine", "simulate", "numpy", "os", "math"} & names == {"Machine"} and set(va.__all__) <= names

@@ -106,7 +106,7 @@ def test_a_table_with_times_is_interpolated_as_by_the_command(machine: va.Machin
         (pd.DataFrame({"x": X}, index=pd.Index(X, name="z1")), "axis 'z1' is unknown"),
         (pd.DataFrame(np.column_stack([X, Y]), columns=["x", "x"]), "two columns 'x'"),
         (pd.DataFrame({"time": TIMES[::-1], "x": X}), "time"),
-        (pd.DataFrame({"time": TIMES}), "psec has no columns; it needs one or more of x"),
+        (pd.DataFrame({"time": TIMES}), "psec has no column of an axis; it needs one or more of x"),
         (pd.DataFrame(np.zeros((3, 4))), "psec has 4 columns"),
     ],
 )

@@ -20,7 +20,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from . import design
 from ._native import PartProgram, Rst, Scenario, __version__, machine_names, nc_program_names, scenario_names
-from .arguments import to_path
+from .arguments import to_list, to_path, to_real
 from .chunks import SweepResult
 from .design import frequency_response as bode
 from .design import plot_bode
@@ -85,14 +85,14 @@ def scenario(name_or_path: str | os.PathLike[str], feed: float | None = None) ->
     `feed` replaces the feed of the scenario, m/min (rpm for a scenario of rotary moves). Raises `ValueError` with file,
     line, key and value for an invalid scenario.
     """
-    return Scenario.load(to_path("name_or_path", name_or_path), feed)
+    return Scenario.load(to_path("name_or_path", name_or_path), None if feed is None else to_real("feed", feed))
 
 
 def nc_program(
     name_or_path: str | os.PathLike[str],
     feed_override: float = 1.0,
     *,
-    ignore: Iterable[int | str] = (),
+    ignore: int | str | Iterable[int | str] = (),
     chord_error: float | None = None,
     centripetal_acceleration: float | None = None,
     dialect: str | None = None,
@@ -120,14 +120,14 @@ def nc_program(
     Raises `ValueError` for other values.
     """
     arguments = {
-        "feed_override": feed_override,
-        "ignore": [str(code) for code in ([ignore] if isinstance(ignore, str) else ignore)],
+        "feed_override": to_real("feed_override", feed_override),
+        "ignore": [str(code) for code in ([ignore] if isinstance(ignore, int | str) else ignore)],
         "chord_error": chord_error,
         "centripetal_acceleration": centripetal_acceleration,
         "dialect": dialect,
         "work_offset": _work_offsets(work_offset),
         "tool_table": None if tools is None or isinstance(tools, Mapping) else to_path("tools", tools),
-        "tools": [_tool(number, *size) for number, size in tools.items()] if isinstance(tools, Mapping) else [],
+        "tools": [_tool(number, size) for number, size in tools.items()] if isinstance(tools, Mapping) else [],
         "tool_change_s": tool_change_s,
         "spindle_s": spindle_s,
     }
@@ -138,13 +138,26 @@ def _work_offsets(offsets: Mapping[str, Sequence[float]] | str | Iterable[str]) 
     """Returns work offsets in the notation of the command, mm and degrees."""
     if not isinstance(offsets, Mapping):
         return [offsets] if isinstance(offsets, str) else list(offsets)
-    units = [1e3] * 3 + [math.degrees(1.0)] * 3
-    return [
-        f"{name}={','.join(repr(float(value) * unit) for value, unit in zip(values, units, strict=False))}"
-        for name, values in offsets.items()
-    ]
+    texts = []
+    for name, given in offsets.items():
+        values = to_list(f"work_offset of {name}", given)
+        if not 3 <= len(values) <= 6:
+            expected = "X, Y and Z in m, then at most A, B and C in rad"
+            raise ValueError(f"work_offset of {name} has {len(values)} values; it must have {expected}")
+        units = [1e3] * 3 + [math.degrees(1.0)] * 3
+        texts.append(f"{name}={','.join(repr(value * unit) for value, unit in zip(values, units, strict=False))}")
+    return texts
 
 
-def _tool(number: int, length: float, radius: float) -> str:
+def _tool(number: int, size: Sequence[float]) -> str:
     """Returns a tool in the notation of LinuxCNC, mm."""
-    return f"T{number} Z{float(length) * 1e3!r} D{float(radius) * 2e3!r}"
+    values = to_list(f"tools: tool {number}", size)
+    if len(values) != 2:
+        raise ValueError(f"tools: tool {number} has {len(values)} values; it must have length and radius in m")
+    length, radius = values
+    return f"T{number} Z{length * 1e3!r} D{radius * 2e3!r}"
+
+
+def __dir__() -> list[str]:
+    """Returns the public names, without those of imported modules."""
+    return sorted({*__all__, "__doc__", "__file__", "__name__", "__path__"})

@@ -31,6 +31,24 @@ def to_floats(name: str, values: Any) -> NDArray[np.float64]:
     return array.astype(np.float64)
 
 
+def to_list(name: str, values: Any) -> list[float]:
+    """Returns numbers in one row; raises `TypeError` for anything but real numbers, `ValueError` for another shape."""
+    array = to_floats(name, values)
+    if array.ndim != 1:
+        raise ValueError(f"{name} has the shape {array.shape}; it needs one dimension, as [1.0, 0.5]")
+    return array.tolist()
+
+
+def to_real(name: str, value: Any) -> float:
+    """Returns a number; raises `TypeError` for anything else."""
+    try:
+        if not isinstance(value, str | bytes):
+            return float(value)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise TypeError(f"{name} is {value!r}; it must be a real number")
+
+
 def to_path(name: str, value: Any) -> str:
     """Returns a name or path as a text; raises `TypeError` for anything else."""
     try:

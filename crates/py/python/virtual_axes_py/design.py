@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from ._native import PredictionModel, Rst
-from .arguments import to_native, to_whole
+from .arguments import to_list, to_native, to_real, to_whole
 from .machine import Machine
 
 if TYPE_CHECKING:
@@ -135,7 +135,8 @@ def rst(r: Sequence[float], s: Sequence[float], t: Sequence[float], t_first: int
 
     Raises `ValueError` if T(1) ≠ R(1), R(1) = 0 or S(0) = 0.
     """
-    return Rst(list(r), list(s), list(t), t_first)
+    r, s, t = (to_list(name, values) for name, values in (("r", r), ("s", s), ("t", t)))
+    return Rst(r, s, t, to_whole("t_first", t_first, -(10**9), 10**9))
 
 
 def gpc(
@@ -155,10 +156,9 @@ def gpc(
     """
     if (lambda_ is None) == (lambda_rel is None):
         raise ValueError("give either lambda_rel or lambda_")
-    weight = lambda_rel if lambda_rel is not None else lambda_
-    assert weight is not None
+    weight = to_real("lambda_", lambda_) if lambda_rel is None else to_real("lambda_rel", lambda_rel)
     n1, n2, nu = (to_whole(name, value, 0, 10**9) for name, value in (("n1", n1), ("n2", n2), ("nu", nu)))
-    return model.gpc(n1, n2, nu, weight, lambda_rel is not None)
+    return _model(model).gpc(n1, n2, nu, weight, lambda_rel is not None)
 
 
 def pid(
@@ -175,7 +175,14 @@ def pid(
     Without integral and derivative time it is proportional. Raises `ValueError` with the name of a parameter out of
     range.
     """
-    return model.pid(gain, integral_time, derivative_time, filter_time, velocity_feedforward)
+    values = {
+        "gain": gain,
+        "integral_time": integral_time,
+        "derivative_time": derivative_time,
+        "filter_time": filter_time,
+        "velocity_feedforward": velocity_feedforward,
+    }
+    return _model(model).pid(*(to_real(name, value) for name, value in values.items()))
 
 
 def place_poles(
@@ -189,24 +196,27 @@ def place_poles(
 
     Complex poles come with their conjugates. Raises `ValueError` for too many or unstable poles.
     """
-    return model.place_poles(list(poles), integrator, velocity_feedforward)
+    if not isinstance(poles, Iterable):
+        raise TypeError(f"poles is {poles!r}; it must be a list, as [0.5, 0.3]")
+    feedforward = to_real("velocity_feedforward", velocity_feedforward)
+    return _model(model).place_poles(list(poles), integrator, feedforward)
 
 
 def margins(model: PredictionModel, rst: Rst) -> Margins:
     """Computes the stability margins; raises `ValueError` with the outermost pole if the loop is unstable."""
-    return Margins(**model.margins(rst))
+    return Margins(**_model(model).margins(_rst(rst)))
 
 
 def poles(model: PredictionModel, rst: Rst) -> list[complex]:
     """Computes the poles of the closed loop in z."""
-    return model.poles(rst)
+    return _model(model).poles(_rst(rst))
 
 
 def to_control(model: PredictionModel) -> control.TransferFunction:
     """Converts a prediction model to python-control: B / A in z with the period Tsp (needs `control`)."""
     import control
 
-    numerator, denominator = _in_z(model.b, model.a)
+    numerator, denominator = _in_z(_model(model).b, model.a)
     return control.TransferFunction(numerator, denominator, model.period)
 
 
@@ -214,7 +224,7 @@ def loop_transfer(model: PredictionModel, rst: Rst) -> control.TransferFunction:
     """Returns the open loop L = B R / (A S) for python-control (needs `control`)."""
     import control
 
-    numerator, denominator = _in_z(rst.r, rst.s)
+    numerator, denominator = _in_z(_rst(rst).r, rst.s)
     return to_control(model) * control.TransferFunction(numerator, denominator, model.period)
 
 
@@ -246,6 +256,21 @@ def from_control(
     leading = denominator[0]
     b = [0.0] * delay + [value / leading for value in numerator]
     return PredictionModel([value / leading for value in denominator], b, found_period)
+
+
+def _model(model: Any) -> PredictionModel:
+    """Returns a prediction model; raises `TypeError` for anything else."""
+    if not isinstance(model, PredictionModel):
+        found = type(model).__name__
+        raise TypeError(f"model is of type {found}; it must be a PredictionModel, as design.model(machine, axis) is")
+    return model
+
+
+def _rst(rst: Any) -> Rst:
+    """Returns a controller; raises `TypeError` for anything else."""
+    if not isinstance(rst, Rst):
+        raise TypeError(f"rst is of type {type(rst).__name__}; it must be an Rst, as design.rst(r, s, t) is")
+    return rst
 
 
 def _period(dt: float | bool | None, wanted: float | None) -> float:

@@ -101,9 +101,9 @@ def identify(
     refine: Sequence[str] | None = None,
     free_i0: bool = False,
     presliding: bool = False,
-    column: Sequence[str] = (),
+    column: str | Sequence[str] = (),
     columns: str | os.PathLike[str] | None = None,
-    topic: Sequence[str] = (),
+    topic: str | Sequence[str] = (),
     joint: str | None = None,
     format: str | None = None,
     rate_hz: float | None = None,
@@ -134,9 +134,9 @@ def identify(
     identified. Releases the global interpreter lock.
     """
     options = {
-        "column": list(column),
+        "column": [column] if isinstance(column, str) else list(column),
         "columns": columns,
-        "topic": list(topic),
+        "topic": [topic] if isinstance(topic, str) else list(topic),
         "joint": joint,
         "format": format,
         "rate_hz": rate_hz,
@@ -154,7 +154,14 @@ def identify(
     }
     native = to_native(machine if machine is not None else Machine.load())
     files, both, others = _sources(recordings), _sources(transmission), _sources(validate)
-    return Identification(_native.identify(native, axis, files, both, others, options))
+    try:
+        return Identification(_native.identify(native, axis, files, both, others, options))
+    except ValueError as error:
+        # The options of the command have the names of the arguments, with dashes.
+        text = str(error)
+        for name in options:
+            text = text.replace(f"--{name.replace('_', '-')}", name)
+        raise ValueError(text) from None
 
 
 def _sources(given: Recording | Sequence[Recording]) -> list[Source]:
@@ -168,6 +175,9 @@ def _source(given: Any) -> Source:
     if isinstance(given, Mapping) and not hasattr(given, "data_vars"):
         return {name: _channel(name, values) for name, values in given.items()}
     columns = None if isinstance(given, str | os.PathLike) else columns_of("recording", given)
+    if columns is None and not isinstance(given, str | bytes | os.PathLike):
+        text = "it must be a path, a dictionary of channels, or a table, as Run.to_pandas() returns it"
+        raise TypeError(f"recording is of type {type(given).__name__}; {text}")
     if columns is None:
         return to_path("recording", given)
     if all(name in CHANNELS for name in columns):

@@ -58,6 +58,8 @@ class Machine:
 
     def __init__(self, native: _native.Machine) -> None:
         """Wraps a native machine; use `load` or `from_yaml`."""
+        if not isinstance(native, _native.Machine):
+            raise TypeError(f"native is of type {type(native).__name__}; Machine.load(name_or_path) loads a machine")
         self._native = native
 
     @staticmethod
@@ -84,6 +86,9 @@ class Machine:
         The keys and units are those of the machine file, as `x.position_loop.gain`. Raises `ValueError` for an unknown
         parameter or a value out of range, `TypeError` for a value of another kind.
         """
+        if not isinstance(changes, Mapping):
+            example = '{"x.position_loop.gain": 2.0}'
+            raise TypeError(f"changes is of type {type(changes).__name__}; it must be a dictionary, as {example}")
         return Machine(self._native.with_(dict(changes)))
 
     def with_controller(self, axis: str, rst: _native.Rst, *, allow_unstable: bool = False) -> Machine:

@@ -23,10 +23,19 @@ def _panels(titles: Sequence[str], given: Iterable[Axes] | None, shared: bool = 
     if given is None:
         figure = _figure((9, 1 + 2.2 * len(titles)))
         return [*np.atleast_1d(figure.subplots(len(titles), 1, sharex=shared))]
-    panels = list(given) if isinstance(given, Iterable) else [given]
+    panels = [_axes(one) for one in np.ravel(np.array([*given] if isinstance(given, Iterable) else [given], object))]
     if len(panels) != len(titles):
         raise ValueError(f"ax has {len(panels)} axes of matplotlib; {len(titles)} are drawn: {'; '.join(titles)}")
     return panels
+
+
+def _axes(ax: Any) -> Axes:
+    """Returns axes of matplotlib; raises `TypeError` for anything else."""
+    from matplotlib.axes import Axes
+
+    if not isinstance(ax, Axes):
+        raise TypeError(f"ax is of type {type(ax).__name__}; it must be axes of matplotlib, as of plt.subplots()")
+    return ax
 
 
 def _figure(size: tuple[float, float]) -> Figure:
@@ -93,7 +102,7 @@ def plot_path(run: Run, plane: str | None, ax: Axes | None) -> Figure:
     if plane not in ("xy", "yz", "xz"):
         raise ValueError(f"plane {plane!r}: must be xy, yz or xz")
     columns = ["xyz".index(axis) for axis in plane]
-    panel = _figure((7, 6)).add_subplot() if ax is None else ax
+    panel = _figure((7, 6)).add_subplot() if ax is None else _axes(ax)
     from matplotlib.collections import LineCollection
 
     panel.plot(*setpoint[:, columns].T, "--", color="0.6", linewidth=1, label="setpoint")
@@ -118,7 +127,7 @@ def plot_polar(run: Run, ax: Axes | None) -> Figure:
     circles = [circle for circle in run.circles() if len(circle.angle)]
     if not circles:
         raise ValueError("the motion has no circle at constant feed; scenario('ballbar') has two")
-    if ax is not None and ax.name != "polar":
+    if ax is not None and _axes(ax).name != "polar":
         raise ValueError(f"ax has the projection {ax.name!r}; it must be polar: plt.subplot(projection='polar')")
     panel: Any = _figure((7, 7)).add_subplot(projection="polar") if ax is None else ax
     low, high = 0.0, 0.0

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from .arguments import to_native, to_whole
+from .arguments import to_floats, to_native, to_whole
 from .machine import Machine
 from .tables import axis_values
 
@@ -60,7 +60,7 @@ class Stepper:
         several machines (machines, axes, cycles), which predictive controllers read; beyond it they see the last one.
         Raises `ValueError` for another shape or a value beyond ±10⁶.
         """
-        ahead = None if preview is None else np.asarray(preview, dtype=np.float64)
+        ahead = None if preview is None else to_floats("preview", preview)
         return self._native.step(axis_values(self._axes, "psec", psec), ahead)
 
     def reset(self, position: ArrayLike | None = None, *, only: Sequence[int] | None = None) -> None:

@@ -113,7 +113,7 @@ def axis_columns(machine: Machine, name: str, given: Any) -> dict[str, NDArray[n
     if unknown:
         raise ValueError(f"{name}: axis {unknown[0]!r} is unknown; known are {', '.join(axes)}, and {TIME} (s)")
     if not any(title in axes for title in found):
-        raise ValueError(f"{name} has no columns; it needs one or more of {', '.join(axes)}")
+        raise ValueError(f"{name} has no column of an axis; it needs one or more of {', '.join(axes)}")
     return found
 
 
@@ -124,10 +124,10 @@ def axis_values(axes: list[str], name: str, given: Any, missing: float | None = 
     that it does not have, which are an error if that is None.
     """
     if isinstance(given, np.ndarray):
-        return np.asarray(given, dtype=np.float64)
+        return to_floats(name, given)
     is_series = hasattr(given, "index") and hasattr(given, "items")
     if not (isinstance(given, Mapping) or is_series):
-        return np.asarray(given, dtype=np.float64)
+        return to_floats(name, given)
     values = {str(label): value for label, value in given.items()}
     if is_series and list(given.index) == list(range(len(given.index))):
         return np.asarray(given, dtype=np.float64)
