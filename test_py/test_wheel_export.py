@@ -75,8 +75,3 @@ def test_an_fmu_has_the_machine_and_its_library(machine, tmp_path: Path):
         assert "modelDescription.xml" in names
         assert archive.read("binaries/linux64/virtual_axes_fmu.so") == library.read_bytes()
         assert "4.25" in archive.read("resources/machine.yaml").decode()
-
-
-def test_the_names_of_the_module_are_the_public_ones():
-    assert dir(va) == sorted(va.__all__)
-    assert {"bode", "check", "fmu", "learn", "robustness"} <= set(va.__all__)

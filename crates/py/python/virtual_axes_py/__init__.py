@@ -74,11 +74,6 @@ __all__ = [
 ]
 
 
-def __dir__() -> list[str]:
-    """Returns the public names."""
-    return __all__
-
-
 def scenario(name_or_path: str | os.PathLike[str], feed: float | None = None) -> Scenario:
     """Loads a built-in scenario (`scenario_names()`) or a scenario file.
 
