@@ -44,6 +44,7 @@ fn tables_fit_a_terminal_of_80_columns() {
     let changes = "x.velocity_loop.integral_time_ms=5,y.velocity_loop.integral_time_ms=7";
     let runs = ["run", "corner-90", "--controller", "cascade,cascade-noff,gpc", "--compare", changes];
     assert_fits(&runs);
+    assert_fits(&["robustness", "corner-90"]);
     assert_fits(&["robustness", "corner-90", "--controller", "gpc"]);
     assert_fits(&["tune", "corner-90", "--controller", "cascade"]);
     assert_fits(&["tune", "x-constant", "--controller", "gpc"]);
@@ -52,6 +53,11 @@ fn tables_fit_a_terminal_of_80_columns() {
     assert_fits(&["learn", "corner-90", "--iterations", "1"]);
     assert_fits(&["run", "pocket"]);
     assert_fits(&["check", "pocket"]);
+    let folder = TestFolder::new("output_width");
+    let file = folder.path("psec.csv");
+    assert_fits(&["psec", "campaign", "--axis", "x", "--out", &file]);
+    text(&["psec", "ballbar", "--out", &file]);
+    assert_fits(&["check", &file]);
     for list in ["scenarios", "machines", "parameters", "interface"] {
         assert_fits(&[list]);
     }

@@ -73,8 +73,10 @@ pub fn assignments(changes: &Bound<'_, PyDict>) -> PyResult<Vec<Assignment>> {
         let key: String =
             key.extract().map_err(|_| PyTypeError::new_err("the key of a parameter is a str"))?;
         let value = to_value(&value).map_err(|_| {
-            let kind = value.get_type();
-            PyTypeError::new_err(format!("{key}: {kind} is no bool, int, float, str or list of one of these"))
+            PyTypeError::new_err(format!(
+                "{key} is of type {}; it must be a bool, int, float, str or a list of one of these",
+                value.get_type().name().map_or_else(|_| "unknown".to_owned(), |name| name.to_string())
+            ))
         })?;
         Ok(Assignment { key, value, source: source.clone() })
     };

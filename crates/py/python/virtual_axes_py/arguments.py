@@ -36,7 +36,7 @@ def to_list(name: str, values: Any) -> list[float]:
     array = to_floats(name, values)
     if array.ndim != 1:
         raise ValueError(f"{name} has the shape {array.shape}; it needs one dimension, as [1.0, 0.5]")
-    return array.tolist()
+    return [float(value) for value in array]
 
 
 def to_real(name: str, value: Any) -> float:

@@ -12,7 +12,7 @@ pub fn text(found: &IdentificationSummary) -> String {
     let lines =
         |lines: Vec<String>| lines.iter().map(|line| text_table::wrapped_line(line)).collect::<String>();
     let mut parts = vec![
-        verdict(found),
+        text_table::wrapped_line(&figures::verdict(found)),
         format!("{}: {}\n", escaped(&found.machine), found.axis),
         text_table::text(&figures::all_recordings(found)),
         text_table::aligned(&figures::values(&found.values), &[0, 2, 5]),
@@ -21,7 +21,7 @@ pub fn text(found: &IdentificationSummary) -> String {
         let currents = figures::friction_currents(friction, found.speed_unit);
         let currents = if currents.rows.is_empty() { String::new() } else { text_table::text(&currents) };
         let laws = text_table::text(&figures::friction_laws(friction));
-        format!("{}\n{laws}\n{currents}", figures::friction(friction))
+        format!("{}{laws}\n{currents}", text_table::wrapped_line(&figures::friction(friction)))
     }));
     parts.push(lines(figures::steps(found)));
     let residuals = figures::residuals(found);

@@ -5,6 +5,7 @@ use virtual_axes_core::path::{Block, Program};
 use virtual_axes_core::units::{DEGREE, MILLIMETER};
 
 use crate::arguments::axis::AxisUnits;
+use crate::output::text_table;
 
 /// Fraction of the programmed feed below which a remark says that it is not reached.
 const REACHED: f64 = 0.5;
@@ -111,11 +112,11 @@ pub fn joint_line(axis: &AxisConfig, ends: [f64; 2], range: [f64; 2], highest: O
     let [start, end] = ends.map(|value| millis(value / length));
     let [low, high] = range.map(|value| millis(value / length));
     let highest = highest.map(|value| format!(", at most {:.2} {speed_name}", value / speed));
-    format!(
-        "{}: start {start} {unit}, end {end} {unit}, range {low} to {high} {unit}{}\n",
+    text_table::wrapped_line(&format!(
+        "{}: start {start} {unit}, end {end} {unit}, range {low} to {high} {unit}{}",
         axis.name(),
         highest.unwrap_or_default()
-    )
+    ))
 }
 
 /// Returns a number with three decimals, without a negative zero.

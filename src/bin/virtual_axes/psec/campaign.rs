@@ -141,7 +141,8 @@ impl CampaignOutput<'_> {
             self.axis
         ));
         for run in self.campaign.runs() {
-            text.push_str(&format!("before {}: {}\n", run.part.name(), self.settings(run).join(" ")));
+            let line = format!("before {}: {}", run.part.name(), self.settings(run).join(" "));
+            text.push_str(&text_table::wrapped_line(&line));
         }
         let key = format!("{}.feedforward.velocity", self.axis);
         let has_feedforward = self.campaign.runs().iter().any(|run| run.part != FeedforwardMode::Off);

@@ -70,7 +70,7 @@ pub fn run(arguments: &RobustnessArguments) -> Result<String, Box<dyn Error>> {
         OutputFormat::Quiet => verdict(arguments, &found),
         OutputFormat::Text => {
             let (path, machine) = (escaped(input.name()), escaped(config.name()));
-            let verdict = verdict(arguments, &found);
+            let verdict = text_table::wrapped_line(verdict(arguments, &found).trim_end());
             let table = text_table::text(&rows(arguments, &config, &found));
             format!("{verdict}\n{path}: {machine}, {controller}, cost {}\n\n{table}", arguments.cost)
         }
