@@ -34,6 +34,9 @@ const ACCEPTED: f64 = 0.9985;
 const START_SHARE: f64 = 0.998;
 /// Part of the planned time after which a plan that failed is tried again.
 const RETRY: f64 = 0.8;
+/// Part of the planned time after which a window with the largest number of intervals is planned again: the work stays in
+/// proportion to the path.
+const FULL_RETRY: f64 = 0.5;
 
 /// Interval of the path with its planned motion.
 #[derive(Debug, Clone)]
@@ -65,10 +68,12 @@ pub(super) struct LookAhead<'a> {
     steady: [Option<f64>; 2],
     /// Time of a stop from the highest rate in the window, s.
     stopping_time: f64,
-    /// Planned time above which the window is not planned again, since that failed, s.
+    /// Planned time above which the window is not planned again, since that failed or the window is full, s.
     retry_time: f64,
     /// Factor on the programmed feeds of pieces not yet read.
     pub feed_factor: f64,
+    /// Number of intervals planned, each time they were planned.
+    pub planned_intervals: u64,
 }
 
 impl<'a> LookAhead<'a> {
@@ -86,6 +91,7 @@ impl<'a> LookAhead<'a> {
             stopping_time: 0.0,
             retry_time: f64::INFINITY,
             feed_factor: 1.0,
+            planned_intervals: 0,
         }
     }
 
@@ -131,11 +137,22 @@ impl<'a> LookAhead<'a> {
                     self.retry_time = RETRY * planned;
                     return Ok(());
                 }
-                self.retry_time = f64::INFINITY;
-            } else if self.entries[count].motion.is_none() && !self.plan(count)? {
-                return Err(self.no_feed(count));
+                self.set_retry_time(reserve);
+            } else if self.entries[count].motion.is_none() {
+                if !self.plan(count)? {
+                    return Err(self.no_feed(count));
+                }
+                self.set_retry_time(reserve);
             }
         }
+    }
+
+    /// Sets the planned time above which the present plan is kept; it exceeds the part of the motion that remains as it is.
+    fn set_retry_time(&mut self, reserve: f64) {
+        let is_full = self.entries.len() >= MAX_INTERVALS;
+        let planned = || self.entries.iter().filter_map(|entry| entry.motion).map(|motion| motion.duration);
+        let retry_time = || (FULL_RETRY * planned().sum::<f64>()).max(2.0 * reserve);
+        self.retry_time = if is_full { retry_time() } else { f64::INFINITY };
     }
 
     fn no_feed(&self, index: usize) -> FeedPlanError {
@@ -352,6 +369,7 @@ impl<'a> LookAhead<'a> {
     fn solve(&mut self, intervals: &[Interval], start: WindowStart) -> Option<(Stations, bool)> {
         let rest = [intervals[0].length, intervals[intervals.len() - 1].length];
         let window = Window { intervals, start, rest, joints: &self.model.joints };
+        self.planned_intervals += intervals.len() as u64;
         let (stations, is_optimal) = self.solver.solve(&window)?;
         stations
             .iter()

@@ -177,6 +177,11 @@ impl<'a> PartProgramPlanner<'a> {
         self.ahead.source.programmed_time
     }
 
+    /// Returns the number of intervals of the path planned so far, counted each time they were planned: the work of planning.
+    pub fn planned_intervals(&self) -> u64 {
+        self.ahead.planned_intervals
+    }
+
     /// Returns the setpoints of the next position cycle, or `None` after the end of the program.
     ///
     /// `feed_override` is 0 to 2 (200 %). Up to 1 it scales the speed along the path, 0 is a feed hold; changes take effect

@@ -7,6 +7,7 @@ mod five_axis;
 mod global_optimum;
 mod limits;
 mod memory;
+mod monotony;
 mod optimum;
 mod profile;
 mod programs;
