@@ -15,6 +15,7 @@ mod activity;
 mod band;
 mod blended_path;
 mod chunk;
+mod corner;
 mod error;
 mod interval_motion;
 mod look_ahead;
@@ -28,6 +29,7 @@ mod planner;
 mod programmed;
 mod source;
 mod speed;
+mod trapezoid;
 mod vector;
 mod window;
 

@@ -82,6 +82,8 @@ pub(super) struct MotionCurve {
     pub cap: FeedCap,
     pub tcp_length: Option<f64>,
     pub at_end: CurveEnd,
+    /// Distance of points from a line within which lines become one, m.
+    pub merge_tolerance: f64,
 }
 
 impl MotionCurve {
