@@ -58,6 +58,9 @@ parameters! {
         pub look_ahead: usize = integer("control.look_ahead", "blocks", 1, 5000).default(Integer(50));
         /// Shortest duration of a block, with control.profile linuxcnc: its servo period.
         pub block_cycle: f64 = number("control.block_cycle_ms", "ms", 0.01, 100.0).default(Number(1.0)).si(MILLISECOND);
+        /// Number of block cycles; the rest of a line before a corner that is shorter at the feed has the acceleration of the
+        /// corner, with control.profile linuxcnc (ARC_BLEND_GAP_CYCLES of the section TRAJ).
+        pub gap_cycles: f64 = number("control.gap_cycles", "", 0.0, 1e4).default(Number(4.0));
         /// Duration of the wait for the end of the motion at dwells, stops and changes of tool and spindle, in addition to
         /// theirs, with control.profile linuxcnc.
         pub wait: f64 = number("control.wait_ms", "ms", 0.0, 1e4).default(Number(15.0)).si(MILLISECOND);
@@ -76,6 +79,7 @@ impl Default for ControlConfig {
             corner_tolerance: None,
             look_ahead: 50,
             block_cycle: MILLISECOND,
+            gap_cycles: 4.0,
             wait: 15.0 * MILLISECOND,
         }
     }

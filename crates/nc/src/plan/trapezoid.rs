@@ -44,9 +44,9 @@ struct Block {
     /// Limits of speed, m/s, and acceleration, m/s², along the path.
     speed: f64,
     acceleration: f64,
-    /// True if motions before or after it overlap with it.
+    /// True if the next motion starts before its end.
     is_overlapping: bool,
-    /// Speed limit and overlap at the start.
+    /// True for lines of X, Y and Z and for arcs in a plane.
     is_simple: bool,
 }
 
@@ -306,37 +306,40 @@ impl TrapezoidPlanner {
         };
         let tangents = [unit(first.jet(first.length)), unit(second.jet(0.0))];
         let angle = angle_between(&tangents, model);
+        let is_straight =
+            angle < STRAIGHT || self.kink_speed(&before, &next, angle) > before.speed.max(next.speed);
         match first.at_end {
             CurveEnd::Stop => self.push(&before, 0.0, Junction::Stop),
             CurveEnd::ExactPath => {
-                let acceleration =
-                    before.acceleration.min(next.acceleration) / (1.0 - self.control.kink_fraction);
-                let change = self.control.kink_fraction * acceleration * self.control.block_cycle;
-                self.push(&before, 0.0, Junction::Through(change / (2.0 * (0.5 * angle).sin())));
+                let end = if is_straight { Junction::Through(f64::INFINITY) } else { Junction::Stop };
+                self.push(&before, 0.0, end);
             }
             CurveEnd::Blend(_) if is_rapid(first) != is_rapid(second) => {
                 self.push(&before, 0.0, Junction::Stop)
             }
             CurveEnd::Blend([tolerance, rotary]) if !(before.is_simple && next.is_simple) => {
-                (before.is_overlapping, next.is_overlapping) = (true, true);
-                let is_rotary = norm(&tangents[0], &model.kinds.linear) == 0.0;
-                let (acceleration, tolerance) = (
-                    self.acceleration(&before),
-                    if is_rotary { rotary_length(rotary, model) } else { tolerance },
-                );
-                // Both motions are half of their overlap's distance from the corner at its middle.
-                let speed = 2.0 * (acceleration * tolerance / (0.5 * angle).sin().max(STRAIGHT)).sqrt();
+                before.is_overlapping = true;
+                // Deviation along the path, whose speed and acceleration include those of the rotary axes.
+                let spatial = norm(&tangents[0], &model.kinds.linear);
+                let tolerance =
+                    if spatial > 0.0 { tolerance / spatial } else { rotary_length(rotary, model) };
+                let deviation = tolerance / (0.5 * angle).sin().max(STRAIGHT);
+                let speed = 2.0 * (self.acceleration(&before) * deviation).sqrt();
                 self.push(&before, 0.0, Junction::Overlap(speed));
             }
             CurveEnd::Blend(_) if angle > PI - REVERSAL => self.push(&before, 0.0, Junction::Stop),
-            CurveEnd::Blend(_) if angle < STRAIGHT => {
-                self.push(&before, 0.0, Junction::Through(f64::INFINITY))
-            }
+            CurveEnd::Blend(_) if is_straight => self.push(&before, 0.0, Junction::Through(f64::INFINITY)),
             CurveEnd::Blend([tolerance, _]) => {
                 self.corner(&before, &mut next, &tangents, [angle, tolerance], model)
             }
         }
         self.block = Some(next);
+    }
+
+    /// Returns the speed at which a change of direction in one block cycle uses its part of the acceleration.
+    fn kink_speed(&self, before: &Block, next: &Block, angle: f64) -> f64 {
+        let acceleration = self.control.kink_fraction * before.acceleration.min(next.acceleration);
+        acceleration * self.control.block_cycle / (2.0 * (0.5 * angle).sin())
     }
 
     /// Completes `before` and appends a corner of `angle` within a tolerance; cuts off the start of `next`.
@@ -407,27 +410,36 @@ impl TrapezoidPlanner {
     /// Appends a motion without the length `cut` at its end.
     fn push(&mut self, block: &Block, cut: f64, end: Junction) {
         let length = block.scale * block.piece.length - block.cut - cut;
+        let mut acceleration = self.acceleration(block);
+        // The rest of a line that is short at the feed becomes part of the corner.
+        if cut > 0.0
+            && matches!(curve(&block.piece).shape, Shape::Line)
+            && length < self.control.gap_cycles * self.control.block_cycle * block.speed
+        {
+            acceleration *= self.control.tangential_fraction;
+        }
         self.push_segment(Segment {
             piece: Arc::clone(&block.piece),
             scale: block.scale,
             from: block.cut / block.scale,
             length: length.max(0.0),
-            speed: block.speed,
-            acceleration: self.acceleration(block),
+            speed: block.speed.min(block.scale * block.piece.length / self.control.block_cycle),
+            acceleration,
             end,
         });
     }
 
-    fn push_segment(&mut self, mut segment: Segment) {
+    fn push_segment(&mut self, segment: Segment) {
         if segment.length < LEAST_LENGTH && matches!(segment.end, Junction::Through(_)) {
             return;
         }
-        segment.speed = segment.speed.min(segment.length / self.control.block_cycle);
         self.elements.push_back(Element::Segment(segment));
     }
 
     /// Appends the motion along a segment to the entries.
     fn execute(&mut self, segment: &Segment, exit: f64, entries: &mut VecDeque<PlannedInterval>) {
+        let fastest = (self.speed * self.speed + 2.0 * segment.acceleration * segment.length).sqrt();
+        let exit = exit.min(fastest);
         let phases = phases(segment, [self.speed, exit]);
         let total: f64 = phases.iter().map(|phase| phase.duration).sum();
         let tail = self.tail_duration(segment, &phases);
@@ -539,20 +551,18 @@ fn rotary_length(tolerance: f64, model: &MachineModel) -> f64 {
     model.kinds.length(&step)
 }
 
-/// Returns the change of direction of X, Y and Z, or of the rotary axes if the others rest; a right angle between both.
+/// Returns the change of direction of X, Y and Z; a motion without them counts as one along X.
 fn angle_between(tangents: &[JointVector; 2], model: &MachineModel) -> f64 {
-    let lengths = tangents.each_ref().map(|tangent| norm(tangent, &model.kinds.linear));
-    let joints = match lengths.map(|length| length > 0.0) {
-        [true, true] => &model.kinds.linear,
-        [false, false] => &model.kinds.rotary,
-        _ => return 0.5 * PI,
-    };
-    let unit = tangents.each_ref().map(|tangent| {
-        let length = norm(tangent, joints);
-        tangent.map(|value| value / length)
+    let linear = &model.kinds.linear;
+    let unit = tangents.each_ref().map(|tangent| -> JointVector {
+        let length = norm(tangent, linear);
+        std::array::from_fn(|i| match length > 0.0 {
+            true => tangent[i] / length,
+            false => f64::from(linear.first() == Some(&i)),
+        })
     });
     let half = |sign: f64| {
-        let sum: f64 = joints.iter().map(|&i| (unit[0][i] + sign * unit[1][i]).powi(2)).sum();
+        let sum: f64 = linear.iter().map(|&i| (unit[0][i] + sign * unit[1][i]).powi(2)).sum();
         sum.sqrt()
     };
     2.0 * half(-1.0).atan2(half(1.0))
