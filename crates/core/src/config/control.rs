@@ -63,7 +63,7 @@ parameters! {
         pub gap_cycles: f64 = number("control.gap_cycles", "", 0.0, 1e4).default(Number(4.0));
         /// Duration of the wait for the end of the motion at dwells, stops and changes of tool and spindle, in addition to
         /// theirs, with control.profile linuxcnc.
-        pub wait: f64 = number("control.wait_ms", "ms", 0.0, 1e4).default(Number(15.0)).si(MILLISECOND);
+        pub wait: f64 = number("control.wait_ms", "ms", 0.0, 1e4).default(Number(25.0)).si(MILLISECOND);
     }
 }
 
@@ -80,7 +80,7 @@ impl Default for ControlConfig {
             look_ahead: 50,
             block_cycle: MILLISECOND,
             gap_cycles: 4.0,
-            wait: 15.0 * MILLISECOND,
+            wait: 25.0 * MILLISECOND,
         }
     }
 }

@@ -44,6 +44,10 @@ struct Block {
     /// Limits of speed, m/s, and acceleration, m/s², along the path.
     speed: f64,
     acceleration: f64,
+    /// Speed limit of its curvature, m/s.
+    bend_speed: f64,
+    /// True if the path has a corner at its start or end that G61 keeps.
+    has_kink: bool,
     /// True if the next motion starts before its end.
     is_overlapping: bool,
     /// True for lines of X, Y and Z and for arcs in a plane.
@@ -249,6 +253,7 @@ impl TrapezoidPlanner {
             speed = speed.min(limit / linear);
         }
         let mut acceleration = f64::INFINITY;
+        let mut bend_speed = f64::INFINITY;
         let is_simple = match &curve.shape {
             Shape::Line => {
                 for (bounds, &first) in model.joints.iter().zip(&first) {
@@ -272,24 +277,24 @@ impl TrapezoidPlanner {
                 let bend = arc.plane.iter().map(|&i| second[i] * second[i]).sum::<f64>().sqrt();
                 let normal = self.control.normal_fraction
                     * arc.plane.iter().map(|&i| model.joints[i].acceleration).fold(f64::INFINITY, f64::min);
-                speed = speed.min((normal.min(model.centripetal) / bend).sqrt());
+                bend_speed = (normal.min(model.centripetal) / bend).sqrt();
                 acceleration *= self.control.tangential_fraction;
                 let others = |joint: &usize| !arc.plane.contains(joint) && first[*joint] != 0.0;
                 !(0..model.joints.len()).any(|joint| others(&joint))
             }
             Shape::Spline(_) => return Err(FeedPlanError::SplineUnsupported { line: curve.line }),
         };
-        if curve.at_end == CurveEnd::ExactPath {
-            acceleration *= 1.0 - self.control.kink_fraction;
-        }
         let scale = model.kinds.length(&first);
         speed *= scale;
+        bend_speed *= scale;
         acceleration *= scale;
         Ok(Block {
             scale,
             cut: 0.0,
             speed,
             acceleration,
+            bend_speed,
+            has_kink: false,
             is_overlapping: false,
             is_simple,
             piece: Arc::new(piece),
@@ -311,6 +316,7 @@ impl TrapezoidPlanner {
         match first.at_end {
             CurveEnd::Stop => self.push(&before, 0.0, Junction::Stop),
             CurveEnd::ExactPath => {
+                (before.has_kink, next.has_kink) = (before.has_kink || !is_straight, !is_straight);
                 let end = if is_straight { Junction::Through(f64::INFINITY) } else { Junction::Stop };
                 self.push(&before, 0.0, end);
             }
@@ -359,9 +365,13 @@ impl TrapezoidPlanner {
         let (sine, cosine) = (0.5 * angle).sin_cos();
         let [before_length, next_length] = [before, &*next].map(|block| block.scale * block.piece.length);
         let most = 0.5 * before_length.min(next_length);
-        let fastest = before.speed.max(next.speed);
-        let radius =
-            (tolerance * cosine / (1.0 - cosine)).min(most * cosine / sine).min(fastest * fastest / normal);
+        let tangential = self.control.tangential_fraction * acceleration;
+        let [fastest, slowest] = [f64::max, f64::min]
+            .map(|f| f(before.speed.min(before.bend_speed), next.speed.min(next.bend_speed)));
+        // Neither an arc as long as a stop and a start nor one that allows the feed need be longer.
+        let radius = (tolerance * cosine / (1.0 - cosine))
+            .min(most * cosine / sine)
+            .min((fastest * fastest / (tangential * angle)).max(fastest * fastest / normal));
         let cut = radius * sine / cosine;
         let cuts = [cut / before.scale, cut / next.scale];
         let length = cuts[0] + cuts[1];
@@ -369,8 +379,8 @@ impl TrapezoidPlanner {
             self.push(before, 0.0, Junction::Stop);
             return;
         }
-        let speed = before.speed.min(next.speed).min((normal * radius).sqrt());
-        self.push(before, cut, Junction::Through(f64::INFINITY));
+        let speed = slowest.min((normal * radius).sqrt());
+        self.push(before, cut, Junction::Through(speed));
         let start = first.point(first.length - cuts[0]);
         let curve = if first.is_line() && second.is_line() {
             PieceCurve::Corner(CornerArc::new(start, tangents, [radius, angle], length))
@@ -395,7 +405,7 @@ impl TrapezoidPlanner {
             from: 0.0,
             length: radius * angle,
             speed,
-            acceleration: self.control.tangential_fraction * acceleration,
+            acceleration: tangential,
             end: Junction::Through(f64::INFINITY),
         });
         next.cut = cut;
@@ -404,26 +414,36 @@ impl TrapezoidPlanner {
     /// Returns the acceleration of a motion along the path, m/s².
     fn acceleration(&self, block: &Block) -> f64 {
         let fraction = if block.is_overlapping { self.control.overlap_fraction } else { 1.0 };
-        block.acceleration * fraction
+        block.acceleration * fraction * self.kink_share(block)
+    }
+
+    /// Returns the part of the acceleration that the corners of a motion leave.
+    fn kink_share(&self, block: &Block) -> f64 {
+        if block.has_kink { 1.0 - self.control.kink_fraction } else { 1.0 }
     }
 
     /// Appends a motion without the length `cut` at its end.
     fn push(&mut self, block: &Block, cut: f64, end: Junction) {
         let length = block.scale * block.piece.length - block.cut - cut;
         let mut acceleration = self.acceleration(block);
-        // The rest of a line that is short at the feed becomes part of the corner.
-        if cut > 0.0
-            && matches!(curve(&block.piece).shape, Shape::Line)
-            && length < self.control.gap_cycles * self.control.block_cycle * block.speed
+        let bend_speed = block.bend_speed * self.kink_share(block).sqrt();
+        let mut speed =
+            block.speed.min(bend_speed).min(block.scale * block.piece.length / self.control.block_cycle);
+        // The rest of a line that is short at the speed of the corner becomes part of it.
+        if let Junction::Through(corner) = end
+            && cut > 0.0
+            && curve(&block.piece).is_line()
+            && length < self.control.gap_cycles * self.control.block_cycle * corner
         {
             acceleration *= self.control.tangential_fraction;
+            speed = speed.min(corner);
         }
         self.push_segment(Segment {
             piece: Arc::clone(&block.piece),
             scale: block.scale,
             from: block.cut / block.scale,
             length: length.max(0.0),
-            speed: block.speed.min(block.scale * block.piece.length / self.control.block_cycle),
+            speed,
             acceleration,
             end,
         });
