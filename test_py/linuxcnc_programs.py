@@ -1,10 +1,21 @@
-"""Part programs with which the cycle time of the profile `linuxcnc` is compared with LinuxCNC's."""
+"""Part programs with which the cycle time of the profile `linuxcnc` is compared with LinuxCNC's.
+
+    python linuxcnc_programs.py        # executes them in LinuxCNC, and writes their times to linuxcnc_times.json
+
+The component `virtual_axes` must be installed (docs/how-to/linuxcnc.md). LinuxCNC runs in real time: leave the machine
+idle.
+"""
 
 from __future__ import annotations
 
+import json
 import math
 import random
+import tempfile
 from collections.abc import Iterable
+from pathlib import Path
+
+TIMES = Path(__file__).with_name("linuxcnc_times.json")
 
 Point = Iterable[float]
 
@@ -55,9 +66,12 @@ def surface(step: float, tracks: int, feed: float) -> str:
     """Returns a raster over a waved surface, back and forth."""
     text = [f"G0 X0 Y0 Z5\nG1 Z1 F1000\nF{feed}"]
     count = round(40 / step)
+
+    def height(x: float, y: float) -> float:
+        return 1.5 * math.sin(x / 4) * math.cos(y / 3)
+
     for track in range(tracks):
         ends = range(count + 1) if track % 2 == 0 else range(count, -1, -1)
-        height = lambda x, y: 1.5 * math.sin(x / 4) * math.cos(y / 3)  # noqa: E731
         text.append(lines("XYZ", ((k * step, track * 0.7, height(k * step, track * 0.7)) for k in ends)))
     return "\n".join([*text, "G0 Z5"])
 
@@ -115,7 +129,13 @@ def helix() -> str:
 def five_axes(step: float, feed: float, tilt: float) -> str:
     """Returns a swarf of short lines with both rotary axes."""
     points = (
-        (step * k, 20 * math.sin(step * k / 12), -2 * math.cos(step * k / 9), tilt * math.sin(step * k / 15), 1.5 * step * k)
+        (
+            step * k,
+            20 * math.sin(step * k / 12),
+            -2 * math.cos(step * k / 9),
+            tilt * math.sin(step * k / 15),
+            1.5 * step * k,
+        )
         for k in range(round(50 / step))
     )
     return f"G0 X0 Y0 Z0 A0 C0\nG1 F{feed}\n{lines('XYZAC', points)}"
@@ -142,30 +162,53 @@ def rosette() -> str:
 
 
 PROGRAMS: dict[str, tuple[str, str]] = {
-    "pocket, exact stop": ("mill", "G61\n" + pocket(4, 6)),
-    "pocket, G64 P0.01": ("mill", "G64 P0.01\n" + pocket(4, 6)),
-    "pocket, G64": ("mill", "G64\n" + pocket(5, 5)),
-    "pocket with rounded corners": ("mill", "G64 P0.02\n" + rounded_pocket(8)),
-    "trochoidal slot": ("mill", "G64 P0.02\n" + trochoid(15)),
-    "slots, G64 P0.05": ("mill", "G64 P0.05\n" + slots(4000)),
-    "slots, exact path": ("mill", "G61\n" + slots(9000)),
-    "raster 0.5 mm, F4000": ("mill", "G64 P0.01\n" + surface(0.5, 8, 4000)),
-    "raster 0.2 mm, F9000": ("mill", "G64 P0.01\n" + surface(0.2, 8, 9000)),
-    "raster 0.2 mm, G64": ("mill", "G64\n" + surface(0.2, 6, 6000)),
-    "raster 1 mm, P0.002": ("mill", "G64 P0.002\n" + surface(1, 8, 8000)),
-    "spiral of lines": ("mill", "G64 P0.01\n" + spiral(7000)),
-    "spiral of lines, P0.001": ("mill", "G64 P0.001\n" + spiral(12000)),
-    "drilling, G81": ("mill", drilling("G98 G81 Z-8 R1 F800")),
-    "drilling, G83": ("mill", drilling("G98 G83 Z-9 R1 Q3 F900")),
-    "dwell, G82": ("mill", drilling("G98 G82 Z-3 R1 P0.1 F900")),
-    "polyline 10 mm": ("mill", "G64 P0.05\n" + scribble(11, 60, 10, 9000)),
-    "polyline 3 mm": ("mill", "G64 P0.02\n" + scribble(12, 120, 3, 6000)),
-    "polyline 1 mm": ("mill", "G64 P0.01\n" + scribble(13, 200, 1, 5000)),
-    "helices": ("mill", "G64 P0.02\n" + helix()),
-    "rosette of arcs": ("mill", "G64 P0.1\n" + rosette()),
-    "five axes, 2 mm": ("mikron", "G64 P0.02\n" + five_axes(2, 3000, 25)),
-    "five axes, 0.5 mm": ("mikron", "G64 P0.02\n" + five_axes(0.5, 3000, 25)),
-    "five axes, 5 mm, G64": ("mikron", "G64\n" + five_axes(5, 6000, 40)),
-    "indexed faces": ("mikron", "G64 P0.02\n" + indexed()),
+    "pocket, exact stop": ("mill", "G61\n" + pocket(3, 7)),
+    "pocket, G64 P0.03": ("mill", "G64 P0.03\n" + pocket(2.5, 8)),
+    "pocket, G64": ("mill", "G64\n" + pocket(6, 4)),
+    "pocket with rounded corners": ("mill", "G64 P0.005\n" + rounded_pocket(6)),
+    "trochoidal slot": ("mill", "G64 P0.1\n" + trochoid(10)),
+    "slots, G64 P0.02": ("mill", "G64 P0.02\n" + slots(7000)),
+    "slots, exact path": ("mill", "G61\n" + slots(5000)),
+    "raster 0.4 mm, F5000": ("mill", "G64 P0.02\n" + surface(0.4, 7, 5000)),
+    "raster 0.25 mm, F10000": ("mill", "G64 P0.005\n" + surface(0.25, 6, 10000)),
+    "raster 0.5 mm, G64": ("mill", "G64\n" + surface(0.5, 6, 7000)),
+    "raster 1.6 mm, P0.003": ("mill", "G64 P0.003\n" + surface(1.6, 8, 6000)),
+    "spiral of lines": ("mill", "G64 P0.02\n" + spiral(9000)),
+    "spiral of lines, P0.002": ("mill", "G64 P0.002\n" + spiral(8000)),
+    "drilling, G81": ("mill", drilling("G98 G81 Z-6 R2 F1000")),
+    "drilling, G83": ("mill", drilling("G98 G83 Z-8 R1 Q2 F1200")),
+    "dwell, G82": ("mill", drilling("G98 G82 Z-4 R1 P0.2 F1100")),
+    "polyline 8 mm": ("mill", "G64 P0.03\n" + scribble(101, 60, 8, 10000)),
+    "polyline 2 mm": ("mill", "G64 P0.01\n" + scribble(102, 120, 2, 7000)),
+    "polyline 0.7 mm": ("mill", "G64 P0.02\n" + scribble(103, 200, 0.7, 4000)),
+    "helices": ("mill", "G64 P0.05\n" + helix()),
+    "rosette of arcs": ("mill", "G64 P0.02\n" + rosette()),
+    "five axes, 3 mm": ("mikron", "G64 P0.01\n" + five_axes(3, 4000, 20)),
+    "five axes, 0.8 mm": ("mikron", "G64 P0.05\n" + five_axes(0.8, 2500, 30)),
+    "five axes, 4 mm, G64": ("mikron", "G64\n" + five_axes(4, 5000, 35)),
+    "indexed faces": ("mikron", "G64 P0.05\n" + indexed()),
 }
 """Machine and text of each program by its name."""
+
+
+def measured_time(machine: str, text: str) -> float:
+    """Returns the time from the first to the last motion of a program in LinuxCNC, s."""
+    from test_linuxcnc import completed
+
+    changes = {"FERROR": "9999", "MIN_FERROR": "9999", "MIN_LIMIT": "-9999", "MAX_LIMIT": "9999"}
+    if machine == "mikron":
+        changes["KINEMATICS"] = "trivkins coordinates=XYZAC"
+    with tempfile.TemporaryDirectory() as folder:
+        rows = [row[::2] for row in completed(Path(folder), machine, changes, [text]).rows()]
+    moved = [index for index in range(1, len(rows)) if rows[index] != rows[index - 1]]
+    return round(1e-3 * (moved[-1] - moved[0] + 1), 3)
+
+
+def main() -> None:
+    """Writes the times of all programs."""
+    times = {name: measured_time(machine, text) for name, (machine, text) in PROGRAMS.items()}
+    TIMES.write_text(json.dumps(times, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()

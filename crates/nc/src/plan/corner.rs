@@ -1,7 +1,9 @@
 //! Curves between two motions: arcs in a corner, and motions that overlap in time.
 
+use std::sync::Arc;
+
 use super::interval_motion::PathState;
-use super::motion_curve::MotionCurve;
+use super::piece::Piece;
 use super::vector::{Jet, JointVector, MAX_JOINTS, difference};
 
 /// Circular arc that touches both lines of a corner.
@@ -50,7 +52,7 @@ impl CornerArc {
 /// Motion with constant acceleration along a curve.
 #[derive(Debug, Clone)]
 pub(super) struct TimedCurve {
-    pub curve: MotionCurve,
+    pub piece: Arc<Piece>,
     /// State at the start.
     pub state: PathState,
 }
@@ -59,8 +61,8 @@ impl TimedCurve {
     /// Returns the coordinates and their derivatives with respect to time.
     fn jet(&self, time: f64) -> Jet {
         let PathState { u, rate, acceleration: a } = self.state;
-        let place = (u + time * (rate + 0.5 * time * a)).clamp(0.0, self.curve.length);
-        let [q, q1, q2, q3] = self.curve.jet(place);
+        let place = (u + time * (rate + 0.5 * time * a)).clamp(0.0, self.piece.length);
+        let [q, q1, q2, q3] = self.piece.jet(place);
         let v = rate + time * a;
         let each = |of: &dyn Fn(usize) -> f64| -> JointVector { std::array::from_fn(of) };
         [
@@ -84,7 +86,7 @@ impl Overlap {
     /// Returns the coordinates and their derivatives at path parameter `u`.
     pub fn jet(&self, u: f64) -> Jet {
         let [ending, starting] = self.motions.each_ref().map(|motion| motion.jet(u * self.pace));
-        let corner = &self.motions[1].curve.from;
+        let corner = self.motions[1].piece.point(0.0);
         let mut jet = [[0.0; MAX_JOINTS]; 4];
         jet[0] = std::array::from_fn(|i| ending[0][i] + (starting[0][i] - corner[i]));
         for order in 1..jet.len() {

@@ -33,7 +33,9 @@ pub(super) struct FeedJoints {
 
 impl FeedJoints {
     pub fn norm(&self, vector: &JointVector) -> f64 {
-        self.indices.iter().flatten().map(|&i| vector[i] * vector[i]).sum::<f64>().sqrt()
+        // Not `sum`, which is -0 without indices.
+        let squares = self.indices.iter().flatten().map(|&i| vector[i] * vector[i]);
+        squares.fold(0.0, |sum, square| sum + square).sqrt()
     }
 }
 

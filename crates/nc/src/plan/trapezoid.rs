@@ -25,7 +25,7 @@ use super::motion_curve::{CurveEnd, FeedCap, MotionCurve, Shape};
 use super::piece::{Piece, PieceCurve};
 use super::pieces::PieceSource;
 use super::source::Part;
-use super::vector::{JointVector, norm};
+use super::vector::{JointVector, MAX_JOINTS, norm};
 
 /// Change of direction below which a path is straight, and distance from a reversal at which it is one, rad.
 const STRAIGHT: f64 = 1e-7;
@@ -478,7 +478,7 @@ impl TrapezoidPlanner {
                             entries.push_back(overlap(segment, state, tail, time + from, to - from))
                         }
                         (2, _) => {
-                            let motion = TimedCurve { curve: curve(&segment.piece).clone(), state };
+                            let motion = TimedCurve { piece: Arc::clone(&segment.piece), state };
                             self.tail = Some(Tail { motion, duration: to - from });
                         }
                         _ => entries.push_back(alone(segment, state, to - from)),
@@ -566,7 +566,7 @@ fn is_spatial(model: &MachineModel, joint: usize) -> bool {
 /// Returns a rotary tolerance in the metric of the path, m.
 fn rotary_length(tolerance: f64, model: &MachineModel) -> f64 {
     let Some(&joint) = model.kinds.rotary.first() else { return tolerance };
-    let mut step = [0.0; super::vector::MAX_JOINTS];
+    let mut step = [0.0; MAX_JOINTS];
     step[joint] = tolerance;
     model.kinds.length(&step)
 }
@@ -607,10 +607,10 @@ fn overlap(segment: &Segment, state: PathState, tail: &Tail, time: f64, duration
     let covered = (after(ending, duration).u - ending.u) + (after(state, duration).u - state.u);
     let length = covered.max(f64::MIN_POSITIVE);
     let motions = [
-        TimedCurve { curve: tail.motion.curve.clone(), state: ending },
-        TimedCurve { curve: curve(&segment.piece).clone(), state },
+        TimedCurve { piece: Arc::clone(&tail.motion.piece), state: ending },
+        TimedCurve { piece: Arc::clone(&segment.piece), state },
     ];
-    let rest = tail.motion.curve.length - ending.u;
+    let rest = tail.motion.piece.length - ending.u;
     let start = segment.piece.start + state.u - rest;
     let curve = PieceCurve::Overlap(Box::new(Overlap { motions, pace: duration / length }));
     let piece = segment.piece.part(curve, length, start);

@@ -16,3 +16,4 @@ mod short_motions;
 mod speed_search;
 mod splines;
 mod timeline;
+mod trapezoid;
