@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use super::control::check_profile;
 use super::control_check::check_control;
 use super::coupling_check::check_couplings;
 use super::cross_check::CrossChecks;
@@ -50,6 +51,7 @@ pub(super) fn check(
     check_publish_rate(&set)?;
     check_clock(&set)?;
     check_couplings(&set)?;
+    check_profile(&set)?;
     for joint in &layout.joints {
         check_plant(&set, joint)?;
         check_control(&set, joint)?;

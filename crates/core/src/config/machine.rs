@@ -7,6 +7,7 @@
 //! tool path tracking in multi-axis High Speed Machining*.
 
 use super::axis::{AxisConfig, MAX_GAIN};
+use super::control::ControlConfig;
 use super::declaration::{CheckedValues, Definitions, Field, numbers_of, parameters};
 use super::definition::{ParameterDefinition, number, text, texts};
 use super::part_program::PartProgramConfig;
@@ -56,6 +57,8 @@ parameters! {
         pub(crate) gantry: Option<GantryConfig>;
         /// Set-up for part programs.
         pub(crate) part_program: PartProgramConfig;
+        /// Trajectory planner of part programs.
+        pub(crate) control: ControlConfig;
     }
 }
 
@@ -175,6 +178,7 @@ impl MachineConfig {
             workpiece: None,
             gantry: None,
             part_program: PartProgramConfig::default(),
+            control: ControlConfig::default(),
         }
     }
 
@@ -196,6 +200,11 @@ impl MachineConfig {
     /// Returns the set-up for part programs.
     pub fn part_program(&self) -> &PartProgramConfig {
         &self.part_program
+    }
+
+    /// Returns the trajectory planner of part programs.
+    pub fn control(&self) -> &ControlConfig {
+        &self.control
     }
 
     /// Returns true if axes are coupled mechanically, by a workpiece or the beam of a gantry.

@@ -17,6 +17,7 @@ mod axis;
 mod axis_units;
 mod chain_check;
 mod check;
+mod control;
 mod control_check;
 mod controller;
 mod coupling_check;
@@ -46,6 +47,7 @@ mod tests;
 pub use aliases::ParameterAlias;
 pub use axis::*;
 pub use axis_units::AxisUnits;
+pub use control::{ControlConfig, ControlProfile};
 pub use definition::{
     AxisKind, DefaultValue, MotorKind, ParameterDefinition, ParameterKind, Presence, Scope,
 };

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
-use virtual_axes_core::config::{MachineConfig, PartProgramConfig};
+use virtual_axes_core::config::{ControlProfile, MachineConfig, PartProgramConfig};
 use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::text::BuiltinFiles;
 use virtual_axes_core::trajectory::PathPlace;
@@ -166,6 +166,8 @@ impl ProgramTrack {
 struct NotedSteps<'a> {
     interpreter: Interpreter<ProgramReader>,
     track: &'a RefCell<ProgramTrack>,
+    /// True if the control joins lines within the tolerance of G64 Q.
+    merges: bool,
 }
 
 impl Iterator for NotedSteps<'_> {
@@ -181,7 +183,9 @@ impl Iterator for NotedSteps<'_> {
         }
         match &step {
             Some(Ok(ProgramStep::Motion(motion))) => {
-                if let PathControl::Blend(Blend { merge_tolerance: Some(_), .. }) = motion.path_control {
+                if let PathControl::Blend(Blend { merge_tolerance: Some(_), .. }) = motion.path_control
+                    && !self.merges
+                {
                     track.merge_tolerance.get_or_insert(motion.line);
                 }
             }
@@ -233,8 +237,10 @@ impl<'a> PartProgramSource<'a> {
         let comments = comments.map_err(|error| format!("{name}: {error}"))?;
         track.replace(ProgramTrack { comments, ..ProgramTrack::default() });
         let interpreter = Interpreter::new(file, name, interpreter);
-        let mut planner = PartProgramPlanner::new(NotedSteps { interpreter, track }, machine, options.plan)
-            .map_err(|error| format!("{name}: {error}"))?;
+        let merges = machine.control().profile == ControlProfile::LinuxCnc;
+        let mut planner =
+            PartProgramPlanner::new(NotedSteps { interpreter, track, merges }, machine, options.plan)
+                .map_err(|error| format!("{name}: {error}"))?;
         planner.keep_programmed_path();
         Ok(Self {
             planner,

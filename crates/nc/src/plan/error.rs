@@ -86,6 +86,12 @@ pub enum FeedPlanError {
         /// Largest number of points.
         allowed: usize,
     },
+    /// Spline on a control that has no splines.
+    #[error("line {line}: the control has no splines: program lines, or set control.profile to own")]
+    SplineUnsupported {
+        /// Source line.
+        line: usize,
+    },
     /// Tool center point control without X, Y and Z.
     #[error("line {line}: tool center point control needs a machine with the axes X, Y and Z")]
     NoToolCenterPoint {

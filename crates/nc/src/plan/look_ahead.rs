@@ -11,6 +11,7 @@ use super::piece::{Piece, PieceCurve};
 use super::pieces::PieceSource;
 use super::source::Part;
 use super::speed::SpeedSolver;
+use super::trapezoid::TrapezoidPlanner;
 use super::vector::JointVector;
 use super::window::{Interval, Stations, Window, WindowStart};
 
@@ -34,6 +35,9 @@ const ACCEPTED: f64 = 0.9985;
 const START_SHARE: f64 = 0.998;
 /// Part of the planned time after which a plan that failed is tried again.
 const RETRY: f64 = 0.8;
+/// Part of the planned time after which a window with the largest number of intervals is planned again: the work stays in
+/// proportion to the path.
+const FULL_RETRY: f64 = 0.5;
 
 /// Interval of the path with its planned motion.
 #[derive(Debug, Clone)]
@@ -50,12 +54,28 @@ pub(super) struct PlannedInterval {
     is_stop: bool,
 }
 
+impl PlannedInterval {
+    /// Creates an interval with a motion of closed form.
+    pub fn closed_form(piece: Arc<Piece>, from: f64, motion: IntervalMotion) -> Self {
+        let (piece, motion) = (Some(piece), Some(motion));
+        Self { interval: None, piece, from, motion, standstill: None, is_stop: true }
+    }
+
+    /// Creates a standstill at the end of a piece.
+    pub fn standstill(piece: Option<Arc<Piece>>, motion: IntervalMotion, activity: ProgramActivity) -> Self {
+        let from = piece.as_ref().map_or(0.0, |piece| piece.length);
+        Self { interval: None, piece, from, motion: Some(motion), standstill: Some(activity), is_stop: true }
+    }
+}
+
 /// Look-ahead window over the pieces of a program.
 pub(super) struct LookAhead<'a> {
     pub source: PieceSource<'a>,
     pub model: Arc<MachineModel>,
     pub entries: VecDeque<PlannedInterval>,
     solver: SpeedSolver,
+    /// Planner of a control with trapezoidal speed, in place of the time-optimal one.
+    pub trapezoid: Option<TrapezoidPlanner>,
     is_finished: bool,
     from_stop: f64,
     last_piece: Option<Arc<Piece>>,
@@ -65,10 +85,12 @@ pub(super) struct LookAhead<'a> {
     steady: [Option<f64>; 2],
     /// Time of a stop from the highest rate in the window, s.
     stopping_time: f64,
-    /// Planned time above which the window is not planned again, since that failed, s.
+    /// Planned time above which the window is not planned again, since that failed or the window is full, s.
     retry_time: f64,
     /// Factor on the programmed feeds of pieces not yet read.
     pub feed_factor: f64,
+    /// Number of intervals planned, each time they were planned.
+    pub planned_intervals: u64,
 }
 
 impl<'a> LookAhead<'a> {
@@ -78,6 +100,7 @@ impl<'a> LookAhead<'a> {
             model,
             entries: VecDeque::new(),
             solver: SpeedSolver::default(),
+            trapezoid: None,
             is_finished: false,
             from_stop: 0.0,
             last_piece: None,
@@ -86,13 +109,19 @@ impl<'a> LookAhead<'a> {
             stopping_time: 0.0,
             retry_time: f64::INFINITY,
             feed_factor: 1.0,
+            planned_intervals: 0,
         }
     }
 
     /// Returns the joints at the start of the program, or `None` if it has no motion.
     pub fn start(&mut self) -> Result<Option<JointVector>, FeedPlanError> {
-        while !self.is_finished && self.last_piece.is_none() {
+        while self.trapezoid.is_none() && !self.is_finished && self.last_piece.is_none() {
             self.extend(self.entries.len(), 0.0)?;
+        }
+        while self.trapezoid.is_some() && self.entries.iter().all(|entry| entry.piece.is_none()) {
+            if !self.extend_trapezoid()? {
+                break;
+            }
         }
         let piece = self.entries.iter().find_map(|entry| entry.piece.as_ref());
         Ok(piece.map(|piece| self.model.joints(piece, 0.0)[0]))
@@ -101,6 +130,11 @@ impl<'a> LookAhead<'a> {
     /// Plans ahead if less than the renewal time is planned. The motion up to `reserve` seconds after the start of the
     /// first interval remains as it is.
     pub fn renew(&mut self, reserve: f64) -> Result<(), FeedPlanError> {
+        if self.trapezoid.is_some() {
+            let planned = |entry: &PlannedInterval| entry.motion.map_or(0.0, |motion| motion.duration);
+            while self.entries.iter().map(planned).sum::<f64>() <= reserve && self.extend_trapezoid()? {}
+            return Ok(());
+        }
         loop {
             let stopping = self.stopping_time;
             let enough = (reserve + RENEWAL * stopping).min(self.retry_time);
@@ -131,11 +165,28 @@ impl<'a> LookAhead<'a> {
                     self.retry_time = RETRY * planned;
                     return Ok(());
                 }
-                self.retry_time = f64::INFINITY;
-            } else if self.entries[count].motion.is_none() && !self.plan(count)? {
-                return Err(self.no_feed(count));
+                self.set_retry_time(reserve);
+            } else if self.entries[count].motion.is_none() {
+                if !self.plan(count)? {
+                    return Err(self.no_feed(count));
+                }
+                self.set_retry_time(reserve);
             }
         }
+    }
+
+    /// Appends the next motion of a control with trapezoidal speed; returns false at the end of the program.
+    fn extend_trapezoid(&mut self) -> Result<bool, FeedPlanError> {
+        let Some(trapezoid) = &mut self.trapezoid else { return Ok(false) };
+        trapezoid.extend(&mut self.source, &self.model, self.feed_factor, &mut self.entries)
+    }
+
+    /// Sets the planned time above which the present plan is kept; it exceeds the part of the motion that remains as it is.
+    fn set_retry_time(&mut self, reserve: f64) {
+        let is_full = self.entries.len() >= MAX_INTERVALS;
+        let planned = || self.entries.iter().filter_map(|entry| entry.motion).map(|motion| motion.duration);
+        let retry_time = || (FULL_RETRY * planned().sum::<f64>()).max(2.0 * reserve);
+        self.retry_time = if is_full { retry_time() } else { f64::INFINITY };
     }
 
     fn no_feed(&self, index: usize) -> FeedPlanError {
@@ -352,6 +403,7 @@ impl<'a> LookAhead<'a> {
     fn solve(&mut self, intervals: &[Interval], start: WindowStart) -> Option<(Stations, bool)> {
         let rest = [intervals[0].length, intervals[intervals.len() - 1].length];
         let window = Window { intervals, start, rest, joints: &self.model.joints };
+        self.planned_intervals += intervals.len() as u64;
         let (stations, is_optimal) = self.solver.solve(&window)?;
         stations
             .iter()

@@ -156,7 +156,7 @@ impl MachineModel {
         let rest = (jerk * (REST_FRACTION * phase).powi(3) / 6.0).clamp(LEAST_REST.min(most), most);
         let middle = self.node(piece, 0.5 * piece.length).1.min(cap);
         let largest = match &piece.curve {
-            PieceCurve::Cubic(_) => {
+            PieceCurve::Cubic(_) | PieceCurve::Corner(_) | PieceCurve::Overlap(_) => {
                 let parts = if piece.is_graded { GRADED_PARTS } else { PARTS };
                 piece.length / parts as f64
             }

@@ -9,12 +9,16 @@
 //!    Straight lines between standstills have the closed form of seven phases.
 //! 3. Feed override: the planned time passes more slowly, within the limits of the axes and on the path.
 //!
-//! Limits hold for the continuous motion, so that differences of setpoints at any position period keep them.
+//! A machine whose control has another profile ([`ControlProfile`](virtual_axes_core::config::ControlProfile)) has a planner
+//! with trapezoidal speed in place of steps 1 and 2.
+//!
+//! Limits of the profile `own` hold for the continuous motion, so that differences of setpoints at any position period keep them.
 
 mod activity;
 mod band;
 mod blended_path;
 mod chunk;
+mod corner;
 mod error;
 mod interval_motion;
 mod look_ahead;
@@ -28,6 +32,7 @@ mod planner;
 mod programmed;
 mod source;
 mod speed;
+mod trapezoid;
 mod vector;
 mod window;
 

@@ -33,7 +33,9 @@ pub(super) struct FeedJoints {
 
 impl FeedJoints {
     pub fn norm(&self, vector: &JointVector) -> f64 {
-        self.indices.iter().flatten().map(|&i| vector[i] * vector[i]).sum::<f64>().sqrt()
+        // Not `sum`, which is -0 without indices.
+        let squares = self.indices.iter().flatten().map(|&i| vector[i] * vector[i]);
+        squares.fold(0.0, |sum, square| sum + square).sqrt()
     }
 }
 
@@ -82,6 +84,8 @@ pub(super) struct MotionCurve {
     pub cap: FeedCap,
     pub tcp_length: Option<f64>,
     pub at_end: CurveEnd,
+    /// Distance of points from a line within which lines become one, m.
+    pub merge_tolerance: f64,
 }
 
 impl MotionCurve {

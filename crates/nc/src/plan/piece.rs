@@ -1,5 +1,6 @@
 //! Smooth pieces of the path that the feed is planned along.
 
+use super::corner::{CornerArc, Overlap};
 use super::motion_curve::{FeedCap, MotionCurve};
 use super::vector::{Jet, JointVector, MAX_JOINTS};
 
@@ -10,6 +11,10 @@ pub(super) enum PieceCurve {
     Cubic(Jet),
     /// Exact curve of a motion.
     Exact(MotionCurve),
+    /// Arc in a corner.
+    Corner(CornerArc),
+    /// Two motions that overlap in time.
+    Overlap(Box<Overlap>),
 }
 
 /// Bound on the feed along a part of a piece; places from the start of the piece.
@@ -62,6 +67,8 @@ impl Piece {
         }
         match &self.curve {
             PieceCurve::Exact(curve) => curve.point(u),
+            PieceCurve::Corner(arc) => arc.jet(u)[0],
+            PieceCurve::Overlap(overlap) => overlap.jet(u)[0],
             PieceCurve::Cubic([p, d1, d2, d3]) => {
                 std::array::from_fn(|i| p[i] + u * (d1[i] + u * (0.5 * d2[i] + u * d3[i] / 6.0)))
             }
@@ -72,6 +79,8 @@ impl Piece {
     pub fn jet(&self, u: f64) -> Jet {
         match &self.curve {
             PieceCurve::Exact(curve) => curve.jet(u),
+            PieceCurve::Corner(arc) => arc.jet(u),
+            PieceCurve::Overlap(overlap) => overlap.jet(u),
             PieceCurve::Cubic([_, d1, d2, d3]) => {
                 let mut jet = [self.point(u), [0.0; MAX_JOINTS], [0.0; MAX_JOINTS], *d3];
                 for i in 0..MAX_JOINTS {
@@ -81,6 +90,12 @@ impl Piece {
                 jet
             }
         }
+    }
+
+    /// Returns a curve of `length` from the path parameter `start` on, beside this piece.
+    pub fn part(&self, curve: PieceCurve, length: f64, start: f64) -> Piece {
+        let (caps, changes) = (Vec::new(), Vec::new());
+        Piece { curve, length, start, caps, changes, end: None, ..*self }
     }
 
     /// Multiplies the programmed feeds by `factor`.

@@ -12,6 +12,9 @@ use super::vector::difference;
 /// Change of the tangent or of the curvature times 1 mm below which an exact path continues without a stop.
 const SMOOTH: f64 = 1e-9;
 
+/// Largest number of lines that become one.
+const MAX_MERGED: usize = 100;
+
 /// Lines and feeds along the path, in order.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mark {
@@ -87,23 +90,38 @@ impl<'a> PieceSource<'a> {
         }
     }
 
+    /// Returns the next motion as programmed, or a standstill, or `None` at the end of the program. Lines in a row are one
+    /// where the points between them are within its tolerance.
+    pub fn next_exact(&mut self) -> Result<Option<Part<Piece>>, FeedPlanError> {
+        self.fill()?;
+        let mut curve = match self.ahead.take() {
+            None => return Ok(None),
+            Some(Part::Stop(standstill)) => return Ok(Some(Part::Stop(standstill))),
+            Some(Part::Path(curve)) => curve,
+        };
+        let start = self.end;
+        self.mark(&curve);
+        let mut between = Vec::new();
+        while between.len() < MAX_MERGED {
+            self.fill()?;
+            let Some(Part::Path(next)) = &self.ahead else { break };
+            between.push(curve.to);
+            if !self.parts.is_merged(&curve, next, &between) {
+                break;
+            }
+            if let Some(Part::Path(next)) = self.ahead.take() {
+                self.mark(&next);
+                let length = curve.length + next.length;
+                curve = MotionCurve { from: curve.from, length, ..next };
+            }
+        }
+        Ok(Some(Part::Path(piece(curve, start, false))))
+    }
+
     fn exact(&mut self, curve: MotionCurve, is_smooth: bool) -> Piece {
         let start = self.end;
         self.mark(&curve);
-        Piece {
-            length: curve.length,
-            start,
-            caps: vec![CapSpan { from: 0.0, to: curve.length, cap: curve.cap }],
-            changes: Vec::new(),
-            line: curve.line,
-            is_graded: false,
-            tcp_length: curve.tcp_length,
-            to_stop: (!is_smooth).then_some(0.0),
-            end: None,
-            is_stop: !is_smooth,
-            feed_factor: 1.0,
-            curve: PieceCurve::Exact(curve),
-        }
+        piece(curve, start, is_smooth)
     }
 
     fn mark(&mut self, curve: &MotionCurve) {
@@ -143,6 +161,24 @@ impl<'a> PieceSource<'a> {
             }
         }
         Ok(())
+    }
+}
+
+/// Returns the piece of a curve at a path parameter.
+fn piece(curve: MotionCurve, start: f64, is_smooth: bool) -> Piece {
+    Piece {
+        length: curve.length,
+        start,
+        caps: vec![CapSpan { from: 0.0, to: curve.length, cap: curve.cap }],
+        changes: Vec::new(),
+        line: curve.line,
+        is_graded: false,
+        tcp_length: curve.tcp_length,
+        to_stop: (!is_smooth).then_some(0.0),
+        end: None,
+        is_stop: !is_smooth,
+        feed_factor: 1.0,
+        curve: PieceCurve::Exact(curve),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use virtual_axes_core::config::{LimitsConfig, MachineConfig};
+use virtual_axes_core::config::{ControlProfile, LimitsConfig, MachineConfig};
 use virtual_axes_core::kinematics::{AxisRole, Kinematics};
 use virtual_axes_core::trajectory::feed_override::{FeedControl, check_feed_override};
 use virtual_axes_core::trajectory::{JointLimits, PathPlace};
@@ -16,6 +16,7 @@ use super::machine_model::MachineModel;
 use super::pieces::PieceSource;
 use super::planned::{Ahead, ORIGIN};
 use super::source::{PartSource, ProgramAxes};
+use super::trapezoid::TrapezoidPlanner;
 use super::vector::{JointVector, MAX_JOINTS, TipToJoints};
 use crate::motion::ProgramStep;
 
@@ -141,8 +142,16 @@ impl<'a> PartProgramPlanner<'a> {
         let slowest = joints.iter().map(|j| j.acceleration / j.jerk).fold(0.0, f64::max);
         let model = MachineModel { joints, kinds: axes.kinds.clone(), tip, centripetal };
         let steps = Box::new(steps.map(|step| step.map_err(Into::into)));
-        let parts = PartSource::new(steps, axes, [options.blend_tolerance, options.rotary_tolerance]);
-        let ahead = LookAhead::new(PieceSource::new(parts, options.knot_distance), Arc::new(model));
+        let control = *machine.control();
+        let is_trapezoidal = control.profile == ControlProfile::LinuxCnc;
+        let tolerance = match is_trapezoidal {
+            true => [control.corner_tolerance.unwrap_or(f64::INFINITY), f64::INFINITY],
+            false => [options.blend_tolerance, options.rotary_tolerance],
+        };
+        let mut parts = PartSource::new(steps, axes, tolerance);
+        parts.stops_at_auxiliaries = is_trapezoidal;
+        let mut ahead = LookAhead::new(PieceSource::new(parts, options.knot_distance), Arc::new(model));
+        ahead.trapezoid = is_trapezoidal.then(|| TrapezoidPlanner::new(control));
         let place = PathPlace { programmed_feed: f64::INFINITY, ..PathPlace::default() };
         let last = PlannedSetpoint {
             psec: ORIGIN,
@@ -175,6 +184,11 @@ impl<'a> PartProgramPlanner<'a> {
     /// the end of the program that of all motions.
     pub fn programmed_time(&self) -> f64 {
         self.ahead.source.programmed_time
+    }
+
+    /// Returns the number of intervals of the path planned so far, counted each time they were planned: the work of planning.
+    pub fn planned_intervals(&self) -> u64 {
+        self.ahead.planned_intervals
     }
 
     /// Returns the setpoints of the next position cycle, or `None` after the end of the program.

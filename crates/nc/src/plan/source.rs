@@ -74,6 +74,8 @@ pub(super) struct PartSource<'a> {
     tool: Option<u32>,
     pending: VecDeque<Part<MotionCurve>>,
     is_finished: bool,
+    /// True if the axes stop for the spindle and the coolant.
+    pub stops_at_auxiliaries: bool,
 }
 
 impl<'a> PartSource<'a> {
@@ -88,12 +90,42 @@ impl<'a> PartSource<'a> {
             tool: None,
             pending,
             is_finished: false,
+            stops_at_auxiliaries: false,
         }
     }
 
     /// Returns the joints by kind of movement.
     pub fn kinds(&self) -> &JointKinds {
         &self.axes.kinds
+    }
+
+    /// Returns true if `next` continues a line such that the points `between` are within its tolerance of a line from the
+    /// start of `curve` to the end of `next`.
+    pub fn is_merged(&self, curve: &MotionCurve, next: &MotionCurve, between: &[JointVector]) -> bool {
+        let xyz = self.axes.set([0, 1, 2]);
+        let step: JointVector = std::array::from_fn(|i| next.to[i] - curve.from[i]);
+        let others = |i: &usize| {
+            !xyz.indices.contains(&Some(*i)) && (curve.from[*i] != next.to[*i] || curve.to[*i] != next.to[*i])
+        };
+        let is_alike = curve.is_line()
+            && next.is_line()
+            && curve.merge_tolerance > 0.0
+            && curve.cap != FeedCap::Rapid
+            && curve.cap == next.cap
+            && curve.at_end == next.at_end
+            && curve.merge_tolerance == next.merge_tolerance
+            && curve.tcp_length == next.tcp_length
+            && curve.tool == next.tool
+            && !(0..MAX_JOINTS).any(|i| others(&i));
+        let square = xyz.norm(&step).powi(2);
+        is_alike
+            && between.iter().all(|point| {
+                let offset: JointVector = std::array::from_fn(|i| point[i] - curve.from[i]);
+                let dot: f64 = xyz.indices.iter().flatten().map(|&i| offset[i] * step[i]).sum();
+                let part = dot / square;
+                let distance = xyz.norm(&std::array::from_fn(|i| offset[i] - part * step[i]));
+                (0.0..=1.0).contains(&part) && distance <= curve.merge_tolerance
+            })
     }
 
     /// Returns the next curve or stop, or `None` at the end of the program.
@@ -127,6 +159,9 @@ impl<'a> PartSource<'a> {
             ProgramEvent::Stop | ProgramEvent::OptionalStop => self.push_stop(0.0, TimeKind::Auxiliary, line),
             ProgramEvent::ToolChange(tool) => {
                 self.tool = Some(*tool);
+                self.push_stop(0.0, TimeKind::Auxiliary, line);
+            }
+            ProgramEvent::Spindle(_) | ProgramEvent::Coolant { .. } if self.stops_at_auxiliaries => {
                 self.push_stop(0.0, TimeKind::Auxiliary, line);
             }
             ProgramEvent::End => self.is_finished = true,
@@ -240,7 +275,23 @@ impl<'a> PartSource<'a> {
             PathControl::ExactStop => CurveEnd::Stop,
         };
         let (line, tcp_length, tool) = (motion.line, motion.tcp_length, self.tool);
-        let curve = MotionCurve { shape, from, to, length, line, tool, feed, cap, tcp_length, at_end };
+        let merge_tolerance = match motion.path_control {
+            PathControl::Blend(blend) => blend.merge_tolerance.or(blend.tolerance).unwrap_or(0.0),
+            _ => 0.0,
+        };
+        let curve = MotionCurve {
+            shape,
+            from,
+            to,
+            length,
+            line,
+            tool,
+            feed,
+            cap,
+            tcp_length,
+            at_end,
+            merge_tolerance,
+        };
         self.pending.push_back(Part::Path(curve));
     }
 

@@ -339,3 +339,14 @@ fn unknown_filter_type_and_bandwidth_of_zero() {
         "my.yaml:{line}: x.current_filter_1.bandwidth_hz = 0: must lie in 1 … 5e5 Hz",
     );
 }
+
+#[test]
+fn parameter_of_another_profile_of_the_control() {
+    let text = mikron_with("    periods:", "    control:\n      wait_ms: 2.5\n    periods:");
+    assert_rejected(
+        &text,
+        "wait_ms",
+        "my.yaml:{line}: control.wait_ms = 2.5: must not be given with control.profile own: set control.profile to linuxcnc, \
+         or remove control.wait_ms",
+    );
+}

@@ -1,0 +1,619 @@
+//! Planner of a control with a trapezoidal speed, after observations of LinuxCNC.
+//!
+//! - Each motion has constant limits of speed and acceleration along its path, from those of the axes in its direction.
+//! - Corners of lines and of arcs in a plane become circular arcs that touch both motions: as far from the corner as the
+//!   tolerance, half of each motion and the feed allow. Arcs and corners use a part of the acceleration across the path and
+//!   another part along it.
+//! - Motions of rotary axes, of more than three linear axes and helices overlap in time: the next one starts while the one
+//!   before slows down, each with a part of the acceleration.
+//! - The control stops between rapid traverse and feed.
+//! - Look-ahead: the speed allows a stop at the end of the last motion that is ahead.
+
+use std::collections::VecDeque;
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use virtual_axes_core::config::ControlConfig;
+
+use super::activity::ProgramStop;
+use super::corner::{CornerArc, Overlap, TimedCurve, cubic_corner};
+use super::error::FeedPlanError;
+use super::interval_motion::{IntervalMotion, Law, PathState};
+use super::look_ahead::PlannedInterval;
+use super::machine_model::MachineModel;
+use super::motion_curve::{CurveEnd, FeedCap, MotionCurve, Shape};
+use super::piece::{Piece, PieceCurve};
+use super::pieces::PieceSource;
+use super::source::Part;
+use super::vector::{JointVector, MAX_JOINTS, norm};
+
+/// Change of direction below which a path is straight, and distance from a reversal at which it is one, rad.
+const STRAIGHT: f64 = 1e-7;
+const REVERSAL: f64 = 1e-3;
+/// Shortest part of a motion that is executed, m.
+const LEAST_LENGTH: f64 = 1e-9;
+
+/// Motion of the program before its end is known.
+#[derive(Debug)]
+struct Block {
+    piece: Arc<Piece>,
+    /// Meters per unit of the path parameter.
+    scale: f64,
+    /// Length cut off by the corner at its start, m.
+    cut: f64,
+    /// Limits of speed, m/s, and acceleration, m/s², along the path.
+    speed: f64,
+    acceleration: f64,
+    /// Speed limit of its curvature, m/s.
+    bend_speed: f64,
+    /// True if the path has a corner at its start or end that G61 keeps.
+    has_kink: bool,
+    /// True if the next motion starts before its end.
+    is_overlapping: bool,
+    /// True for lines of X, Y and Z and for arcs in a plane.
+    is_simple: bool,
+}
+
+/// End of a segment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Junction {
+    /// Continues with at most this speed, m/s.
+    Through(f64),
+    Stop,
+    /// The next motion starts at the latest when this speed is left, m/s.
+    Overlap(f64),
+}
+
+/// Part of the path with constant limits.
+#[derive(Debug)]
+struct Segment {
+    piece: Arc<Piece>,
+    scale: f64,
+    /// Start, from the start of the piece, in the path parameter.
+    from: f64,
+    /// Length, m.
+    length: f64,
+    speed: f64,
+    acceleration: f64,
+    end: Junction,
+}
+
+/// Element of the planned path.
+#[derive(Debug)]
+enum Element {
+    Segment(Segment),
+    Standstill(ProgramStop),
+}
+
+/// Phase of constant acceleration.
+#[derive(Debug, Clone, Copy)]
+struct Phase {
+    duration: f64,
+    /// Distance from the start of the segment, m, speed and acceleration at the start of the phase.
+    at: f64,
+    speed: f64,
+    acceleration: f64,
+}
+
+/// Last part of a motion that overlaps with the next one.
+#[derive(Debug)]
+struct Tail {
+    motion: TimedCurve,
+    duration: f64,
+}
+
+/// Planner with trapezoidal speed.
+#[derive(Debug)]
+pub(super) struct TrapezoidPlanner {
+    control: ControlConfig,
+    block: Option<Block>,
+    elements: VecDeque<Element>,
+    /// Speed at the start of the first element, m/s.
+    speed: f64,
+    tail: Option<Tail>,
+    last_piece: Option<Arc<Piece>>,
+    is_finished: bool,
+}
+
+impl TrapezoidPlanner {
+    pub fn new(control: ControlConfig) -> Self {
+        Self {
+            control,
+            block: None,
+            elements: VecDeque::new(),
+            speed: 0.0,
+            tail: None,
+            last_piece: None,
+            is_finished: false,
+        }
+    }
+
+    /// Appends the planned motion of the next element; returns false at the end of the program.
+    pub fn extend(
+        &mut self,
+        source: &mut PieceSource<'_>,
+        model: &MachineModel,
+        feed_factor: f64,
+        entries: &mut VecDeque<PlannedInterval>,
+    ) -> Result<bool, FeedPlanError> {
+        while !self.is_finished && !self.is_ready() {
+            self.read(source, model, feed_factor)?;
+        }
+        let exit = self.exit_speed();
+        match self.elements.pop_front() {
+            None => Ok(false),
+            Some(Element::Standstill(stop)) => {
+                let motion = IntervalMotion::dwell(stop.time + self.control.wait);
+                entries.push_back(PlannedInterval::standstill(
+                    self.last_piece.clone(),
+                    motion,
+                    stop.activity,
+                ));
+                Ok(true)
+            }
+            Some(Element::Segment(segment)) => {
+                self.last_piece = Some(Arc::clone(&segment.piece));
+                self.execute(&segment, exit, entries);
+                Ok(true)
+            }
+        }
+    }
+
+    /// Returns true if enough of the path is known to execute the first element.
+    fn is_ready(&self) -> bool {
+        let mut segments = 0;
+        for (i, element) in self.elements.iter().enumerate() {
+            let Element::Segment(segment) = element else { return true };
+            segments += 1;
+            match segment.end {
+                Junction::Through(_) => {}
+                Junction::Stop => return true,
+                Junction::Overlap(_) => return i > 0 || self.elements.len() > 1,
+            }
+        }
+        segments > self.control.look_ahead
+    }
+
+    /// Returns the largest speed at the end of the first element from which a stop is possible.
+    fn exit_speed(&self) -> f64 {
+        let mut known = 1;
+        for element in self.elements.iter().take(self.control.look_ahead + 1) {
+            match element {
+                Element::Segment(Segment { end: Junction::Through(_), .. }) => known += 1,
+                _ => break,
+            }
+        }
+        let mut speed = 0.0;
+        for index in (1..known.min(self.elements.len())).rev() {
+            let [Element::Segment(before), Element::Segment(segment)] =
+                [&self.elements[index - 1], &self.elements[index]]
+            else {
+                speed = 0.0;
+                continue;
+            };
+            let Junction::Through(limit) = before.end else {
+                speed = 0.0;
+                continue;
+            };
+            let reachable = f64::sqrt(speed * speed + 2.0 * segment.acceleration * segment.length);
+            speed = reachable.min(segment.speed).min(before.speed).min(limit);
+        }
+        speed
+    }
+
+    /// Reads the next motion or standstill, and completes the one before.
+    fn read(
+        &mut self,
+        source: &mut PieceSource<'_>,
+        model: &MachineModel,
+        feed_factor: f64,
+    ) -> Result<(), FeedPlanError> {
+        match source.next_exact()? {
+            None => {
+                self.close();
+                self.is_finished = true;
+            }
+            Some(Part::Stop(stop)) => {
+                self.close();
+                self.elements.push_back(Element::Standstill(stop));
+            }
+            Some(Part::Path(mut piece)) => {
+                piece.scale_feed(feed_factor);
+                let next = self.block(piece, model)?;
+                match self.block.take() {
+                    Some(before) if before.piece.tcp_length == next.piece.tcp_length => {
+                        self.join(before, next, model);
+                    }
+                    before => {
+                        self.block = before;
+                        self.close();
+                        self.block = Some(next);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Completes the last motion before a standstill.
+    fn close(&mut self) {
+        let Some(mut block) = self.block.take() else { return };
+        block.is_overlapping |= matches!(curve(&block.piece).at_end, CurveEnd::Blend(_));
+        self.push(&block, 0.0, Junction::Stop);
+    }
+
+    /// Returns a motion with its limits.
+    fn block(&self, piece: Piece, model: &MachineModel) -> Result<Block, FeedPlanError> {
+        let curve = curve(&piece);
+        let [_, first, second, _] = curve.jet(0.5 * curve.length);
+        let linear = norm(&first, &model.kinds.linear[..model.kinds.linear.len().min(3)]);
+        let mut speed =
+            curve.cap.rate(&first) * if curve.cap == FeedCap::Rapid { 1.0 } else { piece.feed_factor };
+        if let Some(limit) = self.control.path_velocity.filter(|_| linear > 0.0) {
+            speed = speed.min(limit / linear);
+        }
+        let mut acceleration = f64::INFINITY;
+        let mut bend_speed = f64::INFINITY;
+        let is_simple = match &curve.shape {
+            Shape::Line => {
+                for (bounds, &first) in model.joints.iter().zip(&first) {
+                    speed = speed.min(bounds.velocity / first.abs());
+                    acceleration = acceleration.min(bounds.acceleration / first.abs());
+                }
+                (0..model.joints.len()).all(|joint| first[joint] == 0.0 || is_spatial(model, joint))
+            }
+            Shape::Arc(arc) => {
+                let along = |joint: usize| {
+                    if arc.plane.contains(&joint) {
+                        (arc.plane.iter().map(|&i| first[i] * first[i]).sum::<f64>()).sqrt()
+                    } else {
+                        first[joint].abs()
+                    }
+                };
+                for (joint, bounds) in model.joints.iter().enumerate() {
+                    speed = speed.min(bounds.velocity / along(joint));
+                    acceleration = acceleration.min(bounds.acceleration / along(joint));
+                }
+                let bend = arc.plane.iter().map(|&i| second[i] * second[i]).sum::<f64>().sqrt();
+                let normal = self.control.normal_fraction
+                    * arc.plane.iter().map(|&i| model.joints[i].acceleration).fold(f64::INFINITY, f64::min);
+                bend_speed = (normal.min(model.centripetal) / bend).sqrt();
+                acceleration *= self.control.tangential_fraction;
+                let others = |joint: &usize| !arc.plane.contains(joint) && first[*joint] != 0.0;
+                !(0..model.joints.len()).any(|joint| others(&joint))
+            }
+            Shape::Spline(_) => return Err(FeedPlanError::SplineUnsupported { line: curve.line }),
+        };
+        let scale = model.kinds.length(&first);
+        speed *= scale;
+        bend_speed *= scale;
+        acceleration *= scale;
+        Ok(Block {
+            scale,
+            cut: 0.0,
+            speed,
+            acceleration,
+            bend_speed,
+            has_kink: false,
+            is_overlapping: false,
+            is_simple,
+            piece: Arc::new(piece),
+        })
+    }
+
+    /// Joins two motions: completes `before`, with a corner behind it, and keeps `next`.
+    fn join(&mut self, mut before: Block, mut next: Block, model: &MachineModel) {
+        let [first, second] = [curve(&before.piece), curve(&next.piece)];
+        let is_rapid = |curve: &MotionCurve| curve.cap == FeedCap::Rapid;
+        let unit = |jet: [JointVector; 4]| {
+            let length = model.kinds.length(&jet[1]);
+            jet[1].map(|value| value / length)
+        };
+        let tangents = [unit(first.jet(first.length)), unit(second.jet(0.0))];
+        let angle = angle_between(&tangents, model);
+        let is_straight =
+            angle < STRAIGHT || self.kink_speed(&before, &next, angle) > before.speed.max(next.speed);
+        match first.at_end {
+            CurveEnd::Stop => self.push(&before, 0.0, Junction::Stop),
+            CurveEnd::ExactPath => {
+                (before.has_kink, next.has_kink) = (before.has_kink || !is_straight, !is_straight);
+                let end = if is_straight { Junction::Through(f64::INFINITY) } else { Junction::Stop };
+                self.push(&before, 0.0, end);
+            }
+            CurveEnd::Blend(_) if is_rapid(first) != is_rapid(second) => {
+                self.push(&before, 0.0, Junction::Stop)
+            }
+            CurveEnd::Blend([tolerance, rotary]) if !(before.is_simple && next.is_simple) => {
+                before.is_overlapping = true;
+                // Deviation along the path, whose speed and acceleration include those of the rotary axes.
+                let spatial = norm(&tangents[0], &model.kinds.linear);
+                let tolerance =
+                    if spatial > 0.0 { tolerance / spatial } else { rotary_length(rotary, model) };
+                let deviation = tolerance / (0.5 * angle).sin().max(STRAIGHT);
+                let speed = 2.0 * (self.acceleration(&before) * deviation).sqrt();
+                self.push(&before, 0.0, Junction::Overlap(speed));
+            }
+            CurveEnd::Blend(_) if angle > PI - REVERSAL => self.push(&before, 0.0, Junction::Stop),
+            CurveEnd::Blend(_) if is_straight => self.push(&before, 0.0, Junction::Through(f64::INFINITY)),
+            CurveEnd::Blend([tolerance, _]) => {
+                self.corner(&before, &mut next, &tangents, [angle, tolerance], model)
+            }
+        }
+        self.block = Some(next);
+    }
+
+    /// Returns the speed at which a change of direction in one block cycle uses its part of the acceleration.
+    fn kink_speed(&self, before: &Block, next: &Block, angle: f64) -> f64 {
+        let acceleration = self.control.kink_fraction * before.acceleration.min(next.acceleration);
+        acceleration * self.control.block_cycle / (2.0 * (0.5 * angle).sin())
+    }
+
+    /// Completes `before` and appends a corner of `angle` within a tolerance; cuts off the start of `next`.
+    fn corner(
+        &mut self,
+        before: &Block,
+        next: &mut Block,
+        tangents: &[JointVector; 2],
+        [angle, tolerance]: [f64; 2],
+        model: &MachineModel,
+    ) {
+        let [first, second] = [curve(&before.piece), curve(&next.piece)];
+        let moves = |joint: &usize| tangents.iter().any(|tangent| tangent[*joint] != 0.0);
+        let limits = (0..model.joints.len()).filter(moves).map(|joint| model.joints[joint].acceleration);
+        let acceleration = limits.fold(f64::INFINITY, f64::min);
+        let normal = (self.control.normal_fraction * acceleration).min(model.centripetal);
+        let (sine, cosine) = (0.5 * angle).sin_cos();
+        let [before_length, next_length] = [before, &*next].map(|block| block.scale * block.piece.length);
+        let most = 0.5 * before_length.min(next_length);
+        let tangential = self.control.tangential_fraction * acceleration;
+        let [fastest, slowest] = [f64::max, f64::min]
+            .map(|f| f(before.speed.min(before.bend_speed), next.speed.min(next.bend_speed)));
+        // Neither an arc as long as a stop and a start nor one that allows the feed need be longer.
+        let radius = (tolerance * cosine / (1.0 - cosine))
+            .min(most * cosine / sine)
+            .min((fastest * fastest / (tangential * angle)).max(fastest * fastest / normal));
+        let cut = radius * sine / cosine;
+        let cuts = [cut / before.scale, cut / next.scale];
+        let length = cuts[0] + cuts[1];
+        if length * before.scale < LEAST_LENGTH {
+            self.push(before, 0.0, Junction::Stop);
+            return;
+        }
+        let speed = slowest.min((normal * radius).sqrt());
+        self.push(before, cut, Junction::Through(speed));
+        let start = first.point(first.length - cuts[0]);
+        let curve = if first.is_line() && second.is_line() {
+            PieceCurve::Corner(CornerArc::new(start, tangents, [radius, angle], length))
+        } else {
+            let unit = |curve: &MotionCurve, u: f64| {
+                let tangent = curve.jet(u)[1];
+                let length = model.kinds.length(&tangent);
+                tangent.map(|value| value / length)
+            };
+            let tangents = [unit(first, first.length - cuts[0]), unit(second, cuts[1])];
+            PieceCurve::Cubic(cubic_corner(
+                &[start, second.point(cuts[1])],
+                &tangents,
+                [radius, angle],
+                length,
+            ))
+        };
+        let piece = before.piece.part(curve, length, before.piece.start + first.length - cuts[0]);
+        self.push_segment(Segment {
+            piece: Arc::new(piece),
+            scale: radius * angle / length,
+            from: 0.0,
+            length: radius * angle,
+            speed,
+            acceleration: tangential,
+            end: Junction::Through(f64::INFINITY),
+        });
+        next.cut = cut;
+    }
+
+    /// Returns the acceleration of a motion along the path, m/s².
+    fn acceleration(&self, block: &Block) -> f64 {
+        let fraction = if block.is_overlapping { self.control.overlap_fraction } else { 1.0 };
+        block.acceleration * fraction * self.kink_share(block)
+    }
+
+    /// Returns the part of the acceleration that the corners of a motion leave.
+    fn kink_share(&self, block: &Block) -> f64 {
+        if block.has_kink { 1.0 - self.control.kink_fraction } else { 1.0 }
+    }
+
+    /// Appends a motion without the length `cut` at its end.
+    fn push(&mut self, block: &Block, cut: f64, end: Junction) {
+        let length = block.scale * block.piece.length - block.cut - cut;
+        let mut acceleration = self.acceleration(block);
+        let bend_speed = block.bend_speed * self.kink_share(block).sqrt();
+        let mut speed =
+            block.speed.min(bend_speed).min(block.scale * block.piece.length / self.control.block_cycle);
+        // The rest of a line that is short at the speed of the corner becomes part of it.
+        if let Junction::Through(corner) = end
+            && cut > 0.0
+            && curve(&block.piece).is_line()
+            && length < self.control.gap_cycles * self.control.block_cycle * corner
+        {
+            acceleration *= self.control.tangential_fraction;
+            speed = speed.min(corner);
+        }
+        self.push_segment(Segment {
+            piece: Arc::clone(&block.piece),
+            scale: block.scale,
+            from: block.cut / block.scale,
+            length: length.max(0.0),
+            speed,
+            acceleration,
+            end,
+        });
+    }
+
+    fn push_segment(&mut self, segment: Segment) {
+        if segment.length < LEAST_LENGTH && matches!(segment.end, Junction::Through(_)) {
+            return;
+        }
+        self.elements.push_back(Element::Segment(segment));
+    }
+
+    /// Appends the motion along a segment to the entries.
+    fn execute(&mut self, segment: &Segment, exit: f64, entries: &mut VecDeque<PlannedInterval>) {
+        let fastest = (self.speed * self.speed + 2.0 * segment.acceleration * segment.length).sqrt();
+        let exit = exit.min(fastest);
+        let phases = phases(segment, [self.speed, exit]);
+        let total: f64 = phases.iter().map(|phase| phase.duration).sum();
+        let tail = self.tail_duration(segment, &phases);
+        let overlapped = self.tail.take();
+        let mut time = 0.0;
+        for phase in phases {
+            // Parts of the phase: together with the end of the motion before, alone, and together with the next one.
+            let mut from = 0.0;
+            let ends = [overlapped.as_ref().map_or(0.0, |tail| tail.duration), total - tail, total];
+            for (kind, end) in ends.into_iter().enumerate() {
+                let to = (end - time).clamp(from, phase.duration);
+                if to - from > 1e-12 {
+                    let state = phase.state(from, segment);
+                    match (kind, &overlapped) {
+                        (0, Some(tail)) => {
+                            entries.push_back(overlap(segment, state, tail, time + from, to - from))
+                        }
+                        (2, _) => {
+                            let motion = TimedCurve { piece: Arc::clone(&segment.piece), state };
+                            self.tail = Some(Tail { motion, duration: to - from });
+                        }
+                        _ => entries.push_back(alone(segment, state, to - from)),
+                    }
+                }
+                from = to;
+            }
+            time += phase.duration;
+        }
+        self.speed = exit;
+    }
+
+    /// Returns the part of the last phase during which the next motion starts.
+    fn tail_duration(&self, segment: &Segment, phases: &[Phase]) -> f64 {
+        let (Junction::Overlap(most), Some(last), Some(Element::Segment(next))) =
+            (segment.end, phases.last(), self.elements.front())
+        else {
+            return 0.0;
+        };
+        if last.acceleration >= 0.0 {
+            return 0.0;
+        }
+        let reached = next.speed.min((next.acceleration * next.length).sqrt());
+        let before = self.tail.as_ref().map_or(0.0, |tail| tail.duration);
+        let total: f64 = phases.iter().map(|phase| phase.duration).sum();
+        last.duration
+            .min(most / segment.acceleration)
+            .min(reached / next.acceleration)
+            .min((total - before).max(0.0))
+    }
+}
+
+impl Phase {
+    /// Returns the state in the path parameter of the piece, `time` after the start of the phase.
+    fn state(&self, time: f64, segment: &Segment) -> PathState {
+        PathState {
+            u: segment.from
+                + (self.at + time * (self.speed + 0.5 * time * self.acceleration)) / segment.scale,
+            rate: (self.speed + time * self.acceleration).max(0.0) / segment.scale,
+            acceleration: self.acceleration / segment.scale,
+        }
+    }
+}
+
+/// Returns the motion along a segment between two speeds.
+fn phases(segment: &Segment, [start, end]: [f64; 2]) -> Vec<Phase> {
+    let &Segment { length, speed, acceleration: a, .. } = segment;
+    if length < LEAST_LENGTH {
+        return Vec::new();
+    }
+    let reachable = (0.5 * (start * start + end * end) + a * length).sqrt();
+    let peak = speed.max(start).max(end).min(reachable);
+    let mut phases = Vec::with_capacity(3);
+    let mut at = 0.0;
+    let mut push = |duration: f64, speed: f64, acceleration: f64| {
+        if duration > 0.0 {
+            phases.push(Phase { duration, at, speed, acceleration });
+            at += duration * (speed + 0.5 * duration * acceleration);
+        }
+    };
+    if reachable <= start.max(end) {
+        push(2.0 * length / (start + end), start, (end * end - start * start) / (2.0 * length));
+        return phases;
+    }
+    let ramps = (2.0 * peak * peak - start * start - end * end) / (2.0 * a);
+    push((peak - start) / a, start, a);
+    push((length - ramps).max(0.0) / peak, peak, 0.0);
+    push((peak - end) / a, peak, -a);
+    phases
+}
+
+/// Returns the exact curve of a motion.
+fn curve(piece: &Piece) -> &MotionCurve {
+    match &piece.curve {
+        PieceCurve::Exact(curve) => curve,
+        _ => unreachable!("blocks are exact curves"),
+    }
+}
+
+/// Returns true for X, Y and Z.
+fn is_spatial(model: &MachineModel, joint: usize) -> bool {
+    model.kinds.linear.iter().position(|&linear| linear == joint).is_some_and(|position| position < 3)
+}
+
+/// Returns a rotary tolerance in the metric of the path, m.
+fn rotary_length(tolerance: f64, model: &MachineModel) -> f64 {
+    let Some(&joint) = model.kinds.rotary.first() else { return tolerance };
+    let mut step = [0.0; MAX_JOINTS];
+    step[joint] = tolerance;
+    model.kinds.length(&step)
+}
+
+/// Returns the change of direction of X, Y and Z; a motion without them counts as one along X.
+fn angle_between(tangents: &[JointVector; 2], model: &MachineModel) -> f64 {
+    let linear = &model.kinds.linear;
+    let unit = tangents.each_ref().map(|tangent| -> JointVector {
+        let length = norm(tangent, linear);
+        std::array::from_fn(|i| match length > 0.0 {
+            true => tangent[i] / length,
+            false => f64::from(linear.first() == Some(&i)),
+        })
+    });
+    let half = |sign: f64| {
+        let sum: f64 = linear.iter().map(|&i| (unit[0][i] + sign * unit[1][i]).powi(2)).sum();
+        sum.sqrt()
+    };
+    2.0 * half(-1.0).atan2(half(1.0))
+}
+
+/// Returns the motion along a part of a segment.
+fn alone(segment: &Segment, state: PathState, duration: f64) -> PlannedInterval {
+    let length = duration * (state.rate + 0.5 * duration * state.acceleration);
+    let law = Law::Jerk { rate: state.rate, acceleration: state.acceleration, jerk: 0.0 };
+    let motion = IntervalMotion { law, length, duration };
+    PlannedInterval::closed_form(Arc::clone(&segment.piece), state.u, motion)
+}
+
+/// Returns the end of the motion before, from `time` on, together with the start of a segment.
+fn overlap(segment: &Segment, state: PathState, tail: &Tail, time: f64, duration: f64) -> PlannedInterval {
+    let after = |state: PathState, time: f64| PathState {
+        u: state.u + time * (state.rate + 0.5 * time * state.acceleration),
+        rate: (state.rate + time * state.acceleration).max(0.0),
+        ..state
+    };
+    let ending = after(tail.motion.state, time);
+    let covered = (after(ending, duration).u - ending.u) + (after(state, duration).u - state.u);
+    let length = covered.max(f64::MIN_POSITIVE);
+    let motions = [
+        TimedCurve { piece: Arc::clone(&tail.motion.piece), state: ending },
+        TimedCurve { piece: Arc::clone(&segment.piece), state },
+    ];
+    let rest = tail.motion.piece.length - ending.u;
+    let start = segment.piece.start + state.u - rest;
+    let curve = PieceCurve::Overlap(Box::new(Overlap { motions, pace: duration / length }));
+    let piece = segment.piece.part(curve, length, start);
+    let law = Law::Jerk { rate: length / duration, acceleration: 0.0, jerk: 0.0 };
+    PlannedInterval::closed_form(Arc::new(piece), 0.0, IntervalMotion { law, length, duration })
+}
