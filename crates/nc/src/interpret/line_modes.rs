@@ -29,10 +29,8 @@ impl State {
     /// Returns the modes after the last line.
     pub(super) fn line_modes(&self) -> LineModes {
         let modal = &self.modal;
-        let is_line_or_arc = matches!(
-            modal.motion,
-            Some(Motion::Line | Motion::ClockwiseArc | Motion::CounterclockwiseArc)
-        );
+        let is_line_or_arc =
+            matches!(modal.motion, Some(Motion::Line | Motion::ClockwiseArc | Motion::CounterclockwiseArc));
         let is_plain = is_line_or_arc
             && !matches!(self.dialect, Dialect::Sinumerik | Dialect::Okuma)
             && modal.feed_mode == FeedMode::PerMinute
