@@ -49,6 +49,9 @@ const SLOWEST: f64 = 0.1;
 const IMPROVEMENT: f64 = 0.02;
 /// Cycle time by which setpoints on the grid of the position cycle may exceed the limit, relative to it.
 const TIME_ROUNDING: f64 = 2e-3;
+/// Pieces before and after a point whose errors decide on its shift, and the growth that is no growth.
+const NEAR: usize = 2;
+const LOCAL_TOLERANCE: f64 = 0.01;
 /// Distance between points of a fine path, m, whose shifts are smoothed.
 const FINE: f64 = 2e-3;
 /// Most corrections of the lines that are left out.
@@ -218,9 +221,7 @@ pub fn compile(
             }
             CompileAim::Tolerance(_) => runs.max() < before.max() * (1.0 - IMPROVEMENT),
             CompileAim::Time(_) => {
-                runs.max() <= before.max()
-                    && (runs.max() < before.max() * (1.0 - IMPROVEMENT)
-                        || runs.rms() < before.rms() * (1.0 - IMPROVEMENT))
+                runs.max() <= before.max() && score(&runs) < score(&before) * (1.0 - IMPROVEMENT)
             }
         };
     let (found, runs) = match is_better && found.program.text != text {
@@ -318,12 +319,6 @@ impl Search<'_> {
         Ok(Some(Candidate { changes, program, runs }))
     }
 
-    /// Returns the largest error and part of the mean of those of the lines, m.
-    fn score(&self, runs: &Runs) -> f64 {
-        let lines = runs.lines();
-        runs.max() + MEAN_WEIGHT * lines.values().sum::<f64>() / lines.len().max(1) as f64
-    }
-
     /// Returns the order of candidates: the smallest is the best.
     fn key(&self, candidate: &Candidate) -> (f64, f64) {
         let runs = &candidate.runs;
@@ -333,23 +328,53 @@ impl Search<'_> {
         match self.options.aim {
             CompileAim::Tolerance(tolerance) if runs.max() <= tolerance => (0.0, runs.time),
             CompileAim::Time(_) if runs.time > self.time => (f64::MAX, runs.time),
-            _ => (self.score(runs), runs.time),
+            _ => (score(runs), runs.time),
         }
     }
 
-    /// Shifts points and radii until the errors grow.
-    fn shifted(&self, first: Candidate, mut gain: f64, iterations: usize) -> Result<Candidate, CompileError> {
-        let mut best = first;
+    /// Shifts points and radii. A point whose surrounding errors grow returns, and moves by less in the next iteration.
+    fn shifted(&self, first: Candidate, gain: f64, iterations: usize) -> Result<Candidate, CompileError> {
+        let model = self.model;
+        let mut gains = vec![gain; model.nodes.len()];
+        let mut errors = self.piece_errors(&first);
+        let (mut best, mut present): (Candidate, Option<Candidate>) = (first, None);
         for _ in 0..iterations {
-            match self.candidate(self.shift(&best, gain))? {
-                Some(next)
-                    if self.score(&next.runs) < self.score(&best.runs) && self.is_in_time(&next, &best) =>
-                {
-                    best = next;
+            let from = present.as_ref().unwrap_or(&best);
+            let Some(next) = self.candidate(self.shift(from, &gains))? else {
+                gains.iter_mut().for_each(|gain| *gain *= 0.5);
+                continue;
+            };
+            let found = self.piece_errors(&next);
+            let mut merged = next.changes.clone();
+            let mut is_reverted = false;
+            for (piece, parts) in model.pieces.iter().enumerate() {
+                let around =
+                    |errors: &[f64]| self.around(piece, NEAR).map(|near| errors[near]).fold(0.0, f64::max);
+                if around(&found) > around(&errors) * (1.0 + LOCAL_TOLERANCE) {
+                    merged.shifts[parts.to] = from.changes.shifts[parts.to];
+                    merged.radii[piece] = from.changes.radii[piece];
+                    gains[parts.to] *= 0.5;
+                    is_reverted = true;
                 }
-                _ => gain *= 0.5,
             }
-            if gain < LEAST_GAIN {
+            let next = if is_reverted {
+                model.join_turns(&mut merged);
+                match self.candidate(merged)? {
+                    Some(merged) if score(&merged.runs) < score(&next.runs) => merged,
+                    _ => next,
+                }
+            } else {
+                next
+            };
+            errors = self.piece_errors(&next);
+            let is_better = score(&next.runs) < score(&best.runs) && self.is_in_time(&next, &best);
+            if is_better {
+                best = next;
+                present = None;
+            } else {
+                present = Some(next);
+            }
+            if gains.iter().all(|gain| *gain < LEAST_GAIN) {
                 break;
             }
         }
@@ -361,45 +386,54 @@ impl Search<'_> {
         next.runs.time <= self.time.max(best.runs.time)
     }
 
-    /// Returns changes with points and radii moved against their errors.
-    fn shift(&self, from: &Candidate, gain: f64) -> Changes {
+    /// Returns changes with points and radii moved against their errors: the middle between those of all plants.
+    fn shift(&self, from: &Candidate, gains: &[f64]) -> Changes {
         let model = self.model;
-        let count = from.runs.plants.len().max(1) as f64;
-        let mut errors = vec![Vector3::zeros(); model.nodes.len()];
-        let mut radial = vec![0.0; model.pieces.len()];
+        let mut errors = vec![Middle::<3>::default(); model.nodes.len()];
+        let mut radial = vec![Middle::<1>::default(); model.pieces.len()];
         for run in &from.runs.plants {
             let tips = by_piece(&from.program, model.pieces.len(), &run.tips);
             for (piece, parts) in model.pieces.iter().enumerate() {
                 let after =
-                    (piece + 1 < tips.len() && model.pieces[piece + 1].from == parts.to).then_some(piece + 1);
-                let [from, to] = [tips[piece][0], after.map_or(tips[piece][1], |after| tips[after][1])];
-                let to = to.max(tips[piece][1]);
-                let window = &run.tips[from.saturating_sub(1)..(to + 1).min(run.tips.len())];
-                if let Some(nearest) = nearest(window, &model.nodes[parts.to].tip) {
-                    errors[parts.to] += (nearest - model.nodes[parts.to].tip) / count;
-                }
+                    model.pieces.get(piece + 1).filter(|next| next.from == parts.to).map(|_| piece + 1);
+                let of = |piece: usize| &run.tips[tips[piece][0]..tips[piece][1]];
+                let error = match after {
+                    Some(after) if model.is_line_corner(piece) => {
+                        model.corner_error(piece, [of(piece), of(after)])
+                    }
+                    _ => {
+                        let to = after.map_or(0, |after| tips[after][1]).max(tips[piece][1]);
+                        let window =
+                            &run.tips[tips[piece][0].saturating_sub(1)..(to + 1).min(run.tips.len())];
+                        let tip = model.nodes[parts.to].tip;
+                        nearest(window, &tip).map_or(Vector3::zeros(), |nearest| nearest - tip)
+                    }
+                };
+                errors[parts.to].add(error.into());
                 if let Some((center, radius, [first, second])) = model.circle(piece) {
-                    let [from, to] = tips[piece];
-                    let margin = (to - from) / 8;
-                    let inner = &run.tips[from + margin..to - margin];
+                    let all = of(piece);
+                    let inner = &all[all.len() / 8..all.len() - all.len() / 8];
                     let error = |tip: &Vector3<f64>| {
                         (tip[first] - center[first]).hypot(tip[second] - center[second]) - radius
                     };
                     let sum: f64 = inner.iter().map(|(_, tip)| error(tip)).sum();
-                    radial[piece] += sum / inner.len().max(1) as f64 / count;
+                    radial[piece].add([sum / inner.len().max(1) as f64]);
                 }
             }
         }
+        let errors: Vec<Vector3<f64>> = errors.iter().map(|error| error.value().into()).collect();
         let mut changes = from.changes.clone();
         for index in 0..model.pieces.len() {
             let node = model.pieces[index].to;
+            let gain = gains[node];
             if !model.nodes[node].is_fixed {
                 let error = self.smoothed(&errors, index);
                 changes.shifts[node] -= error * gain;
                 changes.shifts[node] = changes.shifts[node].cap_magnitude(self.largest_shift);
             }
+            let [error] = radial[index].value();
             changes.radii[index] =
-                (changes.radii[index] - radial[index] * gain).clamp(-self.largest_shift, self.largest_shift);
+                (changes.radii[index] - error * gain).clamp(-self.largest_shift, self.largest_shift);
         }
         model.join_turns(&mut changes);
         changes
@@ -426,26 +460,21 @@ impl Search<'_> {
     fn with_feeds(&self, first: Candidate) -> Result<Candidate, CompileError> {
         let mut best = first;
         let mut is_blocked = vec![false; self.model.pieces.len()];
+        let bound = match self.options.aim {
+            CompileAim::Tolerance(tolerance) => tolerance,
+            CompileAim::Time(_) => 0.0,
+        };
         for _ in 0..FEED_ITERATIONS {
-            let bound = match self.options.aim {
-                CompileAim::Tolerance(tolerance) => tolerance,
-                CompileAim::Time(_) => 0.0,
-            };
-            if best.runs.max() <= bound {
-                break;
-            }
             let errors = self.piece_errors(&best);
-            let least = (WORST * best.runs.max()).max(bound);
-            let mut changes = best.changes.clone();
+            let open = |piece: &usize| !is_blocked[*piece] && errors[*piece] > bound;
+            let largest = (0..errors.len()).filter(open).map(|piece| errors[piece]).fold(0.0, f64::max);
             let worst: Vec<usize> =
-                (0..errors.len()).filter(|&piece| errors[piece] >= least && !is_blocked[piece]).collect();
+                (0..errors.len()).filter(open).filter(|piece| errors[*piece] >= WORST * largest).collect();
             if worst.is_empty() {
                 break;
             }
-            let mut slowed = BTreeSet::new();
-            for &piece in &worst {
-                slowed.extend(self.neighbors(piece));
-            }
+            let mut changes = best.changes.clone();
+            let slowed: BTreeSet<usize> = worst.iter().flat_map(|&piece| self.around(piece, 1)).collect();
             for piece in slowed {
                 changes.feeds[piece] = (changes.feeds[piece] * SLOWER).max(SLOWEST);
             }
@@ -472,7 +501,7 @@ impl Search<'_> {
             let mut changes = best.changes.clone();
             let mut is_raised = false;
             for (piece, feed) in changes.feeds.iter_mut().enumerate() {
-                let room = self.neighbors(piece).map(|near| errors[near]).fold(0.0, f64::max);
+                let room = self.around(piece, 1).map(|near| errors[near]).fold(0.0, f64::max);
                 if room * factor < bound && *feed < self.options.feed_limit {
                     *feed = (*feed * factor).min(self.options.feed_limit);
                     is_raised = true;
@@ -492,9 +521,9 @@ impl Search<'_> {
         Ok(best)
     }
 
-    /// Returns a piece and those beside it.
-    fn neighbors(&self, piece: usize) -> impl Iterator<Item = usize> {
-        piece.saturating_sub(1)..(piece + 2).min(self.model.pieces.len())
+    /// Returns a piece and those up to `count` beside it.
+    fn around(&self, piece: usize, count: usize) -> impl Iterator<Item = usize> {
+        piece.saturating_sub(count)..(piece + count + 1).min(self.model.pieces.len())
     }
 
     /// Returns the largest error of each piece on any plant, m.
@@ -507,6 +536,36 @@ impl Search<'_> {
         }
         errors
     }
+}
+
+/// Middle between the least and the largest of the values that are added.
+#[derive(Clone, Copy)]
+struct Middle<const N: usize>([[f64; 2]; N]);
+
+impl<const N: usize> Default for Middle<N> {
+    fn default() -> Self {
+        Self([[f64::INFINITY, f64::NEG_INFINITY]; N])
+    }
+}
+
+impl<const N: usize> Middle<N> {
+    fn add(&mut self, values: [f64; N]) {
+        for (range, value) in self.0.iter_mut().zip(values) {
+            *range = [range[0].min(value), range[1].max(value)];
+        }
+    }
+
+    /// Returns the middle; 0 without a value.
+    fn value(&self) -> [f64; N] {
+        self.0.map(|[least, most]| if least <= most { 0.5 * (least + most) } else { 0.0 })
+    }
+}
+
+/// Returns the largest error and part of the mean of those of the source lines, m.
+fn score(runs: &Runs) -> f64 {
+    let lines = runs.lines();
+    let mean = (lines.values().map(|error| error.powi(2)).sum::<f64>() / lines.len().max(1) as f64).sqrt();
+    runs.max() + MEAN_WEIGHT * mean
 }
 
 /// Returns first and last + 1 index of the tool tips of each piece.

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::io::Cursor;
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::units::MILLIMETER;
 
@@ -20,6 +20,10 @@ use crate::motion::{
 const CENTERS: [char; 3] = ['I', 'J', 'K'];
 /// Change of direction from which a junction is a corner, rad.
 const CORNER_TURN: f64 = 0.05;
+/// Distance from a corner within which errors are those of the corner, m.
+const CORNER_REACH: f64 = 3e-3;
+/// Weight of the size of the shift of a corner beside its errors.
+const CORNER_WEIGHT: f64 = 0.1;
 /// Part of a line within which extra points are placed from each of its ends.
 const SPLIT_PART: f64 = 0.4;
 /// Difference of the tool tip from the coordinates that counts as the same on all lines, m.
@@ -293,6 +297,47 @@ impl Model {
         let mut normal = Vector3::zeros();
         (normal[first], normal[second]) = (at[first] - arc.center[0], at[second] - arc.center[1]);
         normal.try_normalize(0.0).unwrap_or_default()
+    }
+
+    /// Returns true if a line ends at a corner with another line.
+    pub fn is_line_corner(&self, piece: usize) -> bool {
+        let (one, two) = (&self.pieces[piece], &self.pieces[piece + 1]);
+        matches!((one.shape, two.shape), (Shape::Line, Shape::Line))
+            && self.along(piece).angle(&self.along(piece + 1)) > CORNER_TURN
+    }
+
+    /// Returns the vector from start to end of a line, m.
+    fn along(&self, piece: usize) -> Vector3<f64> {
+        let Piece { from, to, .. } = self.pieces[piece];
+        self.nodes[to].tip - self.nodes[from].tip
+    }
+
+    /// Returns the shift of the corner at the end of a line that has the largest errors normal to both lines near it, by
+    /// least squares.
+    pub fn corner_error(&self, piece: usize, tips: [&[(usize, Vector3<f64>)]; 2]) -> Vector3<f64> {
+        let mut matrix = Matrix3::identity() * CORNER_WEIGHT;
+        let mut error = Vector3::zeros();
+        for (piece, is_end, tips) in [(piece, true, tips[0]), (piece + 1, false, tips[1])] {
+            let along = self.along(piece).try_normalize(0.0).unwrap_or_default();
+            matrix += Matrix3::identity() - along * along.transpose();
+            error += self.largest_error(piece, is_end, tips);
+        }
+        matrix.try_inverse().unwrap_or_default() * error
+    }
+
+    /// Returns the largest error vector normal to a line near one of its ends.
+    fn largest_error(&self, piece: usize, at_end: bool, tips: &[(usize, Vector3<f64>)]) -> Vector3<f64> {
+        let along = self.along(piece);
+        let length = along.norm();
+        let along = along.try_normalize(0.0).unwrap_or_default();
+        let start = self.nodes[self.pieces[piece].from].tip;
+        let error = |(_, tip): &(usize, Vector3<f64>)| {
+            let place = (tip - start).dot(&along);
+            let distance = if at_end { length - place } else { place };
+            (0.0..=CORNER_REACH.min(length)).contains(&distance).then(|| tip - start - along * place)
+        };
+        let larger = |a: &Vector3<f64>, b: &Vector3<f64>| a.norm_squared().total_cmp(&b.norm_squared());
+        tips.iter().filter_map(error).max_by(larger).unwrap_or_default()
     }
 
     /// Returns the center of an arc in the workpiece frame, its radius, m, and the axes of its plane.
