@@ -152,8 +152,8 @@ def completed(tmp_path: Path, name: str, changes: dict[str, str], programs: list
     raise AssertionError(f"{session.result}\n{session.output}")
 
 
-def simulated(session: Session, name: str, period_ms: int) -> list[dict[str, str]]:
-    """Returns the trace of `virtual_axes run` on the logged commands."""
+def simulated(session: Session, name: str, period_ms: int, deviation: dict[str, float] | None = None) -> list[dict]:
+    """Returns the trace of `virtual_axes run` on the logged commands, on plants with factors of their parameters."""
     machine, axes, _ = CASES[name]
     setpoints, trace = session.folder / "setpoints.csv", session.folder / "trace.csv"
     lines = ["time," + ",".join(axes)]
@@ -162,6 +162,8 @@ def simulated(session: Session, name: str, period_ms: int) -> list[dict[str, str
         lines.append(",".join(map(repr, [k * period_ms / 1000, *values])))
     setpoints.write_text("\n".join(lines) + "\n")
     options = ["--machine", machine, "--set", f"periods.position_ms={period_ms}", "--trace", str(trace), "-q"]
+    for key, factor in (deviation or {}).items():
+        options += [part for axis in "xyz" for part in ("--set", f"{axis}.deviation.{key}={factor}")]
     subprocess.run([COMMAND, "run", setpoints, *options], check=True, capture_output=True, timeout=120)
     with trace.open() as file:
         return list(csv.DictReader(file))
@@ -244,3 +246,86 @@ def test_invalid_module_parameters_name_what_is_allowed(tmp_path: Path, key: str
     session = Session(tmp_path, "mill", {key: value}, [])
     assert session.result["completed"] == []
     assert reason in session.output
+
+
+SQUARE = "\n".join(
+    ["G64 P0.01", "G0 X-30 Y-30", "G0 Z0", "G4 P0.5", "G1 Z-1 F600", "G1 F3000 X-60"]
+    + ["Y-60", "X-30", "Y-30", "X-60", "Y-60", "X-30", "Y-30", "G1 Z0 F600"]
+)
+CIRCLES = "\n".join(
+    ["G64 P0.01", "G0 X-30 Y-55", "G0 Z0", "G4 P0.5", "G1 Z-1 F600", "G1 F4000 Y-50", "G3 X-40 Y-40 I-10 J0"]
+    + ["G3 I0 J-15", "G3 I0 J-15", "G3 X-50 Y-50 I0 J-10", "G1 Y-55", "G1 Z0 F600"]
+)
+# LinuxCNC has no jerk limit; the axes of the machine file have one.
+CONTROL = [f"{axis}.limits.jerk_m_s3=2000" for axis in "xyz"]
+PERTURBED = [
+    {"inertia": 1.27, "friction": 0.78, "torque_constant": 0.76},
+    {"inertia": 0.76, "friction": 1.24, "torque_constant": 1.27},
+]
+
+
+def distance(point: complex, start: complex, end: complex) -> float:
+    """Returns the distance of a point from a line between two points."""
+    step = end - start
+    along = ((point - start) * step.conjugate()).real / abs(step) ** 2 if step else 0.0
+    return abs(point - start - min(max(along, 0.0), 1.0) * step)
+
+
+def path_of(name: str) -> tuple[list[tuple[complex, complex]], list[complex]]:
+    """Returns the lines and chords of a program of this module in the plane, and its corners."""
+    if name == "square":
+        corners = [-30 - 30j, -60 - 30j, -60 - 60j, -30 - 60j]
+        return list(zip(corners, corners[1:] + corners[:1], strict=True)), corners
+    points = [-30 - 55j, -30 - 50j]
+    for center, radius, start, turns in [
+        (-40 - 50j, 10, 0, 0.25),
+        (-40 - 55j, 15, 0.25, 1),
+        (-40 - 50j, 10, 0.25, 0.25),
+    ]:
+        count = round(360 * turns)
+        angles = [math.tau * (start + turns * k / count) for k in range(count + 1)]
+        points += [center + radius * complex(math.cos(angle), math.sin(angle)) for angle in angles]
+    points.append(-50 - 55j)
+    return list(zip(points, points[1:], strict=False)), [-30 - 55j, -50 - 55j]
+
+
+def largest_error(name: str, rows: list[dict[str, str]]) -> float:
+    """Returns the largest distance of the cut from the programmed path, and of its corners from the cut, µm."""
+    lines, corners = path_of(name)
+    cut = [
+        complex(float(row["x.position"]), float(row["y.position"])) * 1000
+        for row in rows
+        if float(row["z.position"]) < -0.9e-3
+    ]
+    errors = [min(distance(tip, *line) for line in lines) for tip in cut]
+    missed = [min(distance(corner, *pair) for pair in zip(cut, cut[1:], strict=False)) for corner in corners]
+    return 1000 * max(errors + missed)
+
+
+def motion_rows(session: Session) -> int:
+    """Returns the number of servo periods from the first to the last motion."""
+    rows = session.rows()
+    moving = [k for k in range(1, len(rows)) if rows[k][::2] != rows[k - 1][::2]]
+    return moving[-1] - moving[0]
+
+
+@pytest.mark.parametrize("name", ["square", "circles"])
+def test_compiled_programs_halve_the_error_of_deviating_axes(tmp_path: Path, name: str) -> None:
+    program = {"square": SQUARE, "circles": CIRCLES}[name]
+    part, better = tmp_path / "part.ngc", tmp_path / "better.ngc"
+    part.write_text(f"G21 G90 G94 G17 G64\n{program}\nM2\n")
+    options = ["--machine", "mikron_ucp710", "--work-offset", "G54=0,0,0", "--same-time", "--more-time", "3"]
+    sets = [part for value in ["periods.position_ms=1", *CONTROL] for part in ("--set", value)]
+    command = [COMMAND, "compile", part, *options, *sets, "--out", better, "-q"]
+    subprocess.run(command, check=True, capture_output=True, timeout=300)
+    compiled = "\n".join(better.read_text().splitlines()[1:-1])
+    sessions = []
+    for index, text in enumerate([program, compiled]):
+        folder = tmp_path / f"session{index}"
+        folder.mkdir()
+        sessions.append(completed(folder, "mikron", {"FERROR": "50", "MIN_FERROR": "50"}, [text]))
+    before, after = sessions
+    assert motion_rows(after) <= 1.03 * motion_rows(before)
+    for deviation in PERTURBED:
+        errors = [largest_error(name, simulated(session, "mikron", 1, deviation)) for session in sessions]
+        assert errors[1] <= 0.5 * errors[0], (deviation, errors)

@@ -19,7 +19,7 @@ use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::trial::TrialError;
 
-use self::model::{ChangedProgram, Changes, Model};
+use self::model::{ChangedProgram, Changes, ProgramModel};
 use self::simulation::{Runs, Simulator};
 use crate::interpret::InterpreterOptions;
 use crate::offline::PartProgramOptions;
@@ -148,7 +148,7 @@ struct Candidate {
 /// Search for the changes of one program.
 struct Search<'a> {
     simulator: &'a Simulator<'a>,
-    model: &'a Model,
+    model: &'a ProgramModel,
     reference: &'a ProgrammedPath,
     interpreter: &'a InterpreterOptions,
     options: &'a CompileOptions,
@@ -181,7 +181,8 @@ pub fn compile(
         CompileAim::Tolerance(_) => f64::INFINITY,
         CompileAim::Time(more) => before.time * (1.0 + more) * (1.0 + TIME_ROUNDING),
     };
-    let (mut best, mut left_out): (Option<(Model, Candidate)>, BTreeSet<usize>) = (None, BTreeSet::new());
+    let (mut best, mut left_out): (Option<(ProgramModel, Candidate)>, BTreeSet<usize>) =
+        (None, BTreeSet::new());
     let mut pieces = Vec::new();
     for distances in DISTANCES {
         let Some(model) = verified_model((text, name), machine, &interpreter, distances, &mut left_out)?
@@ -239,10 +240,10 @@ fn verified_model(
     interpreter: &InterpreterOptions,
     distances: &[f64],
     left_out: &mut BTreeSet<usize>,
-) -> Result<Option<Model>, CompileError> {
+) -> Result<Option<ProgramModel>, CompileError> {
     let kinematics = Kinematics::new(machine);
     for _ in 0..VERIFICATIONS {
-        let model = Model::read((text, name), (interpreter, &kinematics), distances, left_out)?;
+        let model = ProgramModel::read((text, name), (interpreter, &kinematics), distances, left_out)?;
         let mut trial = model.unchanged();
         for (index, (shift, node)) in trial.shifts.iter_mut().zip(&model.nodes).enumerate() {
             if !node.is_fixed {
@@ -262,7 +263,7 @@ fn verified_model(
     Ok(None)
 }
 
-impl Model {
+impl ProgramModel {
     /// Makes the ends of whole turns the same point, on a circle of the changed radius.
     fn join_turns(&self, changes: &mut Changes) {
         for (index, piece) in self.pieces.iter().enumerate().filter(|(index, _)| self.is_whole_turn(*index)) {
@@ -630,7 +631,7 @@ impl Compiled {
 /// Returns the program with the figures before and after.
 fn report(
     text: &str,
-    model: &Model,
+    model: &ProgramModel,
     found: &Candidate,
     before: &Runs,
     after: &Runs,

@@ -38,7 +38,7 @@ const HALF_TURN_MARGIN: f64 = 0.2;
 
 /// End of a part of a cut.
 #[derive(Debug, Clone)]
-pub(super) struct Node {
+pub(super) struct CutPoint {
     programmed: Coordinates,
     at: Coordinates,
     /// Tool tip in the workpiece frame, m.
@@ -49,20 +49,20 @@ pub(super) struct Node {
 
 /// Curve of a piece.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Shape {
+pub(super) enum CutShape {
     Line,
     Arc(PlanarArc),
 }
 
 /// Cut, or part of a cut with extra points.
 #[derive(Debug, Clone)]
-pub(super) struct Piece {
+pub(super) struct CutPiece {
     /// Motion, and source line from 1.
     motion: usize,
     pub line: usize,
     pub from: usize,
     pub to: usize,
-    pub shape: Shape,
+    pub shape: CutShape,
 }
 
 /// Changes of the points and feeds of a program.
@@ -79,20 +79,20 @@ pub(super) struct Changes {
 /// Text of a changed program.
 pub(super) struct ChangedProgram {
     pub text: String,
-    /// Piece of each line, and its source line, from 1.
+    /// CutPiece of each line, and its source line, from 1.
     pub pieces: Vec<Option<usize>>,
     pub sources: Vec<usize>,
 }
 
 /// Program with the cuts that can be changed.
-pub(super) struct Model {
+pub(super) struct ProgramModel {
     lines: Vec<String>,
     line_end: &'static str,
     motions: Vec<(ProgramMotion, LineModes)>,
     events: Vec<ProgramEvent>,
     words: BTreeMap<usize, WordLine>,
-    pub nodes: Vec<Node>,
-    pub pieces: Vec<Piece>,
+    pub nodes: Vec<CutPoint>,
+    pub pieces: Vec<CutPiece>,
     /// Pieces of each line that is changed, in order.
     by_line: BTreeMap<usize, std::ops::Range<usize>>,
     /// First and last line of each sequence of changed lines.
@@ -117,7 +117,7 @@ fn steps(text: &str, name: &str, options: &InterpreterOptions) -> Result<Steps, 
     Ok((motions, events))
 }
 
-impl Model {
+impl ProgramModel {
     /// Reads a program; lines of `left_out` are not changed, and extra points are placed at `distances` from corners, m.
     ///
     /// # Errors
@@ -219,7 +219,7 @@ impl Model {
         let is_shifted = self.motions[chain.clone()]
             .iter()
             .all(|(motion, _)| (offset(&motion.end, motion.tcp_length) - place).norm() < SAME);
-        let node = |at: Coordinates, motion: &ProgramMotion, modes: &LineModes, is_fixed: bool| Node {
+        let node = |at: Coordinates, motion: &ProgramMotion, modes: &LineModes, is_fixed: bool| CutPoint {
             programmed: std::array::from_fn(|axis| modes.programmed[axis] + at[axis] - motion.end[axis]),
             tip: tip(&at, motion.tcp_length),
             at,
@@ -233,11 +233,11 @@ impl Model {
             let begins = self.pieces.len();
             let is_last = index + 1 == chain.end;
             let shape = match motion.kind {
-                MotionKind::Arc(arc) => Shape::Arc(arc),
-                _ => Shape::Line,
+                MotionKind::Arc(arc) => CutShape::Arc(arc),
+                _ => CutShape::Line,
             };
             let mut places = vec![1.0];
-            if let (Shape::Line, PathControl::Blend(_), true) = (shape, motion.path_control, is_shifted) {
+            if let (CutShape::Line, PathControl::Blend(_), true) = (shape, motion.path_control, is_shifted) {
                 let length = (direction(motion, true).1).norm();
                 let near: Vec<f64> = distances
                     .iter()
@@ -259,7 +259,7 @@ impl Model {
                 });
                 let to = self.nodes.len();
                 self.nodes.push(node(at, motion, modes, is_last && place == 1.0));
-                self.pieces.push(Piece { motion: index, line: motion.line, from: to - 1, to, shape });
+                self.pieces.push(CutPiece { motion: index, line: motion.line, from: to - 1, to, shape });
             }
             self.by_line.insert(motion.line, begins..self.pieces.len());
         }
@@ -285,13 +285,13 @@ impl Model {
 
     /// Returns true for an arc of at least a whole turn.
     pub fn is_whole_turn(&self, piece: usize) -> bool {
-        matches!(self.pieces[piece].shape, Shape::Arc(arc) if arc.sweep.abs() >= WHOLE_TURN)
+        matches!(self.pieces[piece].shape, CutShape::Arc(arc) if arc.sweep.abs() >= WHOLE_TURN)
     }
 
     /// Returns the unit vector from the center of an arc to one of its ends, in three coordinates; zero for a line.
     pub fn normal(&self, piece: usize, at_end: bool) -> Vector3<f64> {
-        let Piece { from, to, shape, .. } = self.pieces[piece];
-        let Shape::Arc(arc) = shape else { return Vector3::zeros() };
+        let CutPiece { from, to, shape, .. } = self.pieces[piece];
+        let CutShape::Arc(arc) = shape else { return Vector3::zeros() };
         let [first, second, _] = arc.plane.axes();
         let at = &self.nodes[if at_end { to } else { from }].at;
         let mut normal = Vector3::zeros();
@@ -302,13 +302,13 @@ impl Model {
     /// Returns true if a line ends at a corner with another line.
     pub fn is_line_corner(&self, piece: usize) -> bool {
         let (one, two) = (&self.pieces[piece], &self.pieces[piece + 1]);
-        matches!((one.shape, two.shape), (Shape::Line, Shape::Line))
+        matches!((one.shape, two.shape), (CutShape::Line, CutShape::Line))
             && self.along(piece).angle(&self.along(piece + 1)) > CORNER_TURN
     }
 
     /// Returns the vector from start to end of a line, m.
     fn along(&self, piece: usize) -> Vector3<f64> {
-        let Piece { from, to, .. } = self.pieces[piece];
+        let CutPiece { from, to, .. } = self.pieces[piece];
         self.nodes[to].tip - self.nodes[from].tip
     }
 
@@ -342,8 +342,8 @@ impl Model {
 
     /// Returns the center of an arc in the workpiece frame, its radius, m, and the axes of its plane.
     pub fn circle(&self, piece: usize) -> Option<(Vector3<f64>, f64, [usize; 2])> {
-        let Piece { from, shape, .. } = self.pieces[piece];
-        let Shape::Arc(arc) = shape else { return None };
+        let CutPiece { from, shape, .. } = self.pieces[piece];
+        let CutShape::Arc(arc) = shape else { return None };
         let [first, second, _] = arc.plane.axes();
         let node = &self.nodes[from];
         let mut center = node.tip;
@@ -411,7 +411,7 @@ impl Model {
         carried: &mut Coordinates,
         is_first: bool,
     ) -> Vec<(char, String)> {
-        let Piece { motion, from, to, shape, .. } = self.pieces[piece];
+        let CutPiece { motion, from, to, shape, .. } = self.pieces[piece];
         let modes = &self.motions[motion].1;
         let least = if modes.unit == MILLIMETER { 4 } else { 5 };
         let start = *carried;
@@ -438,7 +438,7 @@ impl Model {
                 None => {}
             }
         }
-        let Shape::Arc(arc) = shape else { return numbers };
+        let CutShape::Arc(arc) = shape else { return numbers };
         let center = self.center(piece, &arc, changes);
         let [first, second, _] = arc.plane.axes();
         if let Some(radius) = words.value('R') {
@@ -467,7 +467,7 @@ impl Model {
 
     /// Returns the center of a changed arc, in its plane: through both ends, and for a part of a turn through its middle.
     fn center(&self, piece: usize, arc: &PlanarArc, changes: &Changes) -> [f64; 2] {
-        let Piece { from, to, .. } = self.pieces[piece];
+        let CutPiece { from, to, .. } = self.pieces[piece];
         let [first, second, _] = arc.plane.axes();
         let center = Vector2::from(arc.center);
         let plane = |vector: &Vector3<f64>| Vector2::new(vector[first], vector[second]);
