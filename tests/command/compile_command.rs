@@ -88,7 +88,7 @@ fn increments_inches_and_arcs_by_radius_keep_their_path() {
 G0 X1. Z1.
 G4 P0.5
 G1 X1. F120.
-G2 X.4 Z-.4 R.4
+G3 X.4 Z-.4 R.4
 G1 Z-.5
 Z-.5 X-.5
 G38.2 X-.1 F20.
@@ -115,14 +115,17 @@ fn a_tolerance_is_held_in_less_time_than_the_least_error_or_reported_as_not_held
     let report = json(&["compile", &part, "--tolerance-um", "35", "--json"]);
     assert!(figure(&report, "before", "all_plants") > 35.0);
     assert!(figure(&report, "after", "all_plants") <= 35.0);
-    let verdict = printed(&["compile", &part, "--tolerance-um", "35", "--quiet"]);
-    assert!(verdict.ends_with("; tolerance 35.0 µm held\n"), "{verdict}");
-    let verdict = printed(&["compile", &part, "--tolerance-um", "0.1", "--quiet"]);
+    let corner = "G21 G90 G64 P0.01\nG1 X-30 F3000\nY-20\nM2\n";
+    let corner = folder.file("corner.nc", corner).to_string_lossy().into_owned();
+    let verdict = printed(&["compile", &corner, "--tolerance-um", "0.1", "--quiet"]);
     assert!(verdict.ends_with("; tolerance 0.1 µm not held\n"), "{verdict}");
     // A program within the tolerance needs no change.
     let out = folder.path("same.nc");
     let verdict = printed(&["compile", &part, "--tolerance-um", "500", "--quiet", "--out", &out]);
-    assert!(verdict.starts_with("program unchanged"), "{verdict}");
+    assert!(
+        verdict.starts_with("program unchanged") && verdict.ends_with("; tolerance 500.0 µm held\n"),
+        "{verdict}"
+    );
     assert_eq!(std::fs::read_to_string(&out).expect("the program"), SQUARE);
     // With a higher feed it takes less time, within the tolerance.
     let report = json(&["compile", &part, "--tolerance-um", "500", "--feed-limit", "150", "--json"]);

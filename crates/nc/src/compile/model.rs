@@ -244,10 +244,10 @@ impl ProgramModel {
                     .map(|distance| distance / length)
                     .filter(|part| *part < SPLIT_PART)
                     .collect();
-                if index > chain.start && self.is_corner(index) {
+                if index == chain.start || self.is_corner(index) {
                     places.extend(&near);
                 }
-                if !is_last && self.is_corner(index + 1) {
+                if is_last || self.is_corner(index + 1) {
                     places.extend(near.iter().map(|part| 1.0 - part));
                 }
                 places.sort_by(f64::total_cmp);
