@@ -424,7 +424,7 @@ impl Search<'_> {
         }
         let errors: Vec<Vector3<f64>> = errors.iter().map(|error| error.value().into()).collect();
         let mut changes = from.changes.clone();
-        for index in 0..model.pieces.len() {
+        for (index, radial) in radial.iter().enumerate() {
             let node = model.pieces[index].to;
             let gain = gains[node];
             if !model.nodes[node].is_fixed {
@@ -432,7 +432,7 @@ impl Search<'_> {
                 changes.shifts[node] -= error * gain;
                 changes.shifts[node] = changes.shifts[node].cap_magnitude(self.largest_shift);
             }
-            let [error] = radial[index].value();
+            let [error] = radial.value();
             changes.radii[index] =
                 (changes.radii[index] - error * gain).clamp(-self.largest_shift, self.largest_shift);
         }
