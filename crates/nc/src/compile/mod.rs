@@ -6,6 +6,7 @@
 //! at the largest errors, as iterative learning does with setpoints. Each step is simulated again against the path of the
 //! program as it was, and only the best one remains.
 
+mod error;
 mod model;
 mod simulation;
 mod words;
@@ -17,8 +18,8 @@ use std::path::PathBuf;
 use nalgebra::Vector3;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::kinematics::Kinematics;
-use virtual_axes_core::trial::TrialError;
 
+pub use self::error::CompileError;
 use self::model::{ChangedProgram, Changes, ProgramModel};
 use self::simulation::{Runs, Simulator};
 use crate::interpret::InterpreterOptions;
@@ -75,20 +76,6 @@ pub struct CompileOptions {
     pub feed_limit: f64,
     /// Interpretation and planning of the program.
     pub program: PartProgramOptions,
-}
-
-/// Error of a compilation.
-#[derive(Debug, thiserror::Error)]
-pub enum CompileError {
-    /// Program that is invalid.
-    #[error("{0}")]
-    Program(String),
-    /// Run that fails.
-    #[error(transparent)]
-    Trial(TrialError),
-    /// No plant to simulate, or a thread that ended early.
-    #[error("no plant was simulated")]
-    NoPlant,
 }
 
 /// Figures of a program on all plants.

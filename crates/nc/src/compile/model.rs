@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::units::MILLIMETER;
 
-use super::CompileError;
+use super::error::CompileError;
 use super::words::{WordLine, number, rounded};
 use crate::interpret::{Interpreter, InterpreterOptions, LineModes, TipTransform};
 use crate::motion::{

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::trial::{self, GridRows, GridSource, Measures, SetpointSource, Trial, TrialError};
 
-use super::CompileError;
+use super::error::CompileError;
 use crate::offline::{LineErrors, PartProgramOptions, PartProgramSource, ProgramTrack, ProgrammedErrors};
 use crate::plan::ProgrammedPath;
 
