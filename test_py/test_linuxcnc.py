@@ -61,11 +61,17 @@ CASES = {"mill": ("vmc", "xyz", MILL), "mikron": ("mikron_ucp710", "xyzac", FIVE
 class Session:
     """Session of LinuxCNC without a screen, in a folder of its own."""
 
-    def __init__(self, folder: Path, name: str, changes: dict[str, str], programs: list[str]) -> None:
+    def __init__(
+        self, folder: Path, name: str, changes: dict[str, str], programs: list[str], has_drives: bool = True
+    ) -> None:
         self.folder, self.log = folder, folder / "log.csv"
         for file in (CHECKOUT / "linuxcnc").glob("*"):
             if file.suffix in {".ini", ".hal", ".tbl"}:
                 shutil.copy(file, folder)
+        self.has_drives = has_drives
+        if not has_drives:
+            hal = folder / f"{name}.hal"
+            hal.write_text(without_drives(hal.read_text()))
         text = (folder / f"{name}.ini").read_text()
         changes = {"DISPLAY": str(CHECKOUT / "linuxcnc/headless.py"), **changes}
         for key, value in changes.items():
@@ -125,7 +131,8 @@ class Session:
         """Returns command and feedback of each joint in each servo period."""
         with self.log.open() as file:
             rows = [[float(cell) for cell in row] for row in list(csv.reader(file))[1:]]
-        assert [row[0] for row in rows] == list(range(len(rows))), "a row for each step"
+        if self.has_drives:
+            assert [row[0] for row in rows] == list(range(len(rows))), "a row for each step"
         return [row[1:] for row in rows]
 
 
@@ -141,19 +148,21 @@ def component(tmp_path_factory: pytest.TempPathFactory) -> None:
     (MODULES / "virtual_axes.so").unlink()
 
 
-def completed(tmp_path: Path, name: str, changes: dict[str, str], programs: list[str]) -> Session:
+def completed(
+    tmp_path: Path, name: str, changes: dict[str, str], programs: list[str], has_drives: bool = True
+) -> Session:
     """Returns a session that has completed all programs; LinuxCNC's task sometimes ends by itself under load."""
     for attempt in range(ATTEMPTS):
         folder = tmp_path / str(attempt)
         folder.mkdir()
-        session = Session(folder, name, changes, programs)
+        session = Session(folder, name, changes, programs, has_drives)
         if len(session.result["completed"]) == len(programs):
             return session
     raise AssertionError(f"{session.result}\n{session.output}")
 
 
-def simulated(session: Session, name: str, period_ms: int) -> list[dict[str, str]]:
-    """Returns the trace of `virtual_axes run` on the logged commands."""
+def simulated(session: Session, name: str, period_ms: int, deviation: dict[str, float] | None = None) -> list[dict]:
+    """Returns the trace of `virtual_axes run` on the logged commands, on plants with factors of their parameters."""
     machine, axes, _ = CASES[name]
     setpoints, trace = session.folder / "setpoints.csv", session.folder / "trace.csv"
     lines = ["time," + ",".join(axes)]
@@ -162,6 +171,8 @@ def simulated(session: Session, name: str, period_ms: int) -> list[dict[str, str
         lines.append(",".join(map(repr, [k * period_ms / 1000, *values])))
     setpoints.write_text("\n".join(lines) + "\n")
     options = ["--machine", machine, "--set", f"periods.position_ms={period_ms}", "--trace", str(trace), "-q"]
+    for key, factor in (deviation or {}).items():
+        options += [part for axis in "xyz" for part in ("--set", f"{axis}.deviation.{key}={factor}")]
     subprocess.run([COMMAND, "run", setpoints, *options], check=True, capture_output=True, timeout=120)
     with trace.open() as file:
         return list(csv.DictReader(file))
@@ -244,3 +255,89 @@ def test_invalid_module_parameters_name_what_is_allowed(tmp_path: Path, key: str
     session = Session(tmp_path, "mill", {key: value}, [])
     assert session.result["completed"] == []
     assert reason in session.output
+
+
+CIRCLES = "\n".join(
+    ["G64 P0.01", "G0 X-30 Y-55", "G0 Z0", "G4 P0.5", "G1 Z-1 F600", "G1 F4000 Y-50", "G3 X-40 Y-40 I-10 J0"]
+    + ["G3 I0 J-15", "G3 I0 J-15", "G3 X-50 Y-50 I0 J-10", "G1 Y-55", "G1 Z0 F600"]
+)
+# LinuxCNC has no jerk limit; the axes of the machine file have one.
+CONTROL = [f"{axis}.limits.jerk_m_s3=2000" for axis in "xyz"]
+PERTURBED = [
+    {"inertia": 1.27, "friction": 0.78, "torque_constant": 0.76},
+    {"inertia": 0.76, "friction": 1.24, "torque_constant": 1.27},
+]
+
+
+def distance(point: complex, start: complex, end: complex) -> float:
+    """Returns the distance of a point from a line between two points."""
+    step = end - start
+    along = ((point - start) * step.conjugate()).real / abs(step) ** 2 if step else 0.0
+    return abs(point - start - min(max(along, 0.0), 1.0) * step)
+
+
+def path_of_circles() -> tuple[list[tuple[complex, complex]], list[complex]]:
+    """Returns the lines and chords of `CIRCLES` in the plane, and the points where cuts begin and end."""
+    points = [-30 - 55j, -30 - 50j]
+    for center, radius, start, turns in [
+        (-40 - 50j, 10, 0, 0.25),
+        (-40 - 55j, 15, 0.25, 1),
+        (-40 - 50j, 10, 0.25, 0.25),
+    ]:
+        count = round(360 * turns)
+        angles = [math.tau * (start + turns * k / count) for k in range(count + 1)]
+        points += [center + radius * complex(math.cos(angle), math.sin(angle)) for angle in angles]
+    points.append(-50 - 55j)
+    return list(zip(points, points[1:], strict=False)), [-30 - 55j, -50 - 55j]
+
+
+def largest_error(rows: list[dict[str, str]]) -> float:
+    """Returns the largest distance of the cut from the programmed path, and of its corners from the cut, µm."""
+    lines, corners = path_of_circles()
+    cut = [
+        complex(float(row["x.position"]), float(row["y.position"])) * 1000
+        for row in rows
+        if float(row["z.position"]) < -0.9e-3
+    ]
+    errors = [min(distance(tip, *line) for line in lines) for tip in cut]
+    missed = [min(distance(corner, *pair) for pair in zip(cut, cut[1:], strict=False)) for corner in corners]
+    return 1000 * max(errors + missed)
+
+
+def motion_rows(session: Session) -> int:
+    """Returns the number of servo periods from the first to the last motion."""
+    rows = session.rows()
+    moving = [k for k in range(1, len(rows)) if rows[k][::2] != rows[k - 1][::2]]
+    return moving[-1] - moving[0]
+
+
+def without_drives(text: str) -> str:
+    """Returns a HAL file of this package with the commanded positions as feedback."""
+    omitted = ("loadrt virtual_axes", "addf virtual-axes", "net drive-fault", "net fb-", "net enable-")
+    text = "\n".join(line for line in text.splitlines() if not line.startswith(omitted))
+    for joint in range(5):
+        feedback = f"joint.{joint}.motor-pos-fb sampler.0.pin.{2 * joint + 1}"
+        text = text.replace(f"virtual-axes.{joint}.cmd", feedback)
+    # Rows are logged from the first on.
+    return text.replace("net steps virtual-axes.steps =>", "net steps") + "\nsets steps 2\n"
+
+
+def test_a_compiled_program_halves_the_error_of_deviating_axes(tmp_path: Path) -> None:
+    program = CIRCLES
+    part, better = tmp_path / "part.ngc", tmp_path / "better.ngc"
+    part.write_text(f"G21 G90 G94 G17 G64\n{program}\nM2\n")
+    options = ["--machine", "mikron_ucp710", "--work-offset", "G54=0,0,0", "--same-time", "--more-time", "3"]
+    sets = [part for value in ["periods.position_ms=1", *CONTROL] for part in ("--set", value)]
+    command = [COMMAND, "compile", part, *options, *sets, "--out", better, "-q"]
+    subprocess.run(command, check=True, capture_output=True, timeout=400)
+    compiled = "\n".join(better.read_text().splitlines()[1:-1])
+    sessions = []
+    for index, text in enumerate([program, compiled]):
+        folder = tmp_path / f"session{index}"
+        folder.mkdir()
+        sessions.append(completed(folder, "mikron", {}, [text], has_drives=False))
+    before, after = sessions
+    assert motion_rows(after) <= 1.03 * motion_rows(before)
+    for deviation in PERTURBED:
+        errors = [largest_error(simulated(session, "mikron", 1, deviation)) for session in sessions]
+        assert errors[1] <= 0.5 * errors[0], (deviation, errors)

@@ -5,6 +5,7 @@ mod command;
 mod command_campaign;
 mod command_common;
 mod command_design;
+mod compile_command;
 mod examples;
 mod files_output;
 mod hints;

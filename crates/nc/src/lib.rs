@@ -28,6 +28,7 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used))]
 
 pub mod builtin;
+pub mod compile;
 pub mod interpret;
 pub mod motion;
 pub mod offline;

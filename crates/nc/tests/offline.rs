@@ -282,3 +282,38 @@ fn times_do_not_need_energy() {
     assert!(with.tools[0].energy.is_some() && without.tools[0].energy.is_none());
     assert!(without.energy_lines.is_empty() && with.times == without.times);
 }
+
+/// Returns the errors of `text` against the path of `reference`.
+fn errors_against(name: &str, [text, reference]: [&str; 2]) -> virtual_axes_nc::offline::ProgrammedErrors {
+    let (machine, options) = (machine(), PartProgramOptions::default());
+    let track = RefCell::new(ProgramTrack::default());
+    let mut row = vec![0.0; machine.axes().len()];
+    let mut source = PartProgramSource::read(reference, (name, None), &machine, &options, &track).unwrap();
+    while source.next(&mut row).unwrap() {}
+    drop(source);
+    let mut lines = LineErrors::new(&machine).with_reference(track.take().programmed);
+    let source = PartProgramSource::read(text, (name, None), &machine, &options, &track).unwrap();
+    trial::run(&trial_of(&machine), SetpointSource::Grid(Box::new(source)), |tick| {
+        lines.add(&tick, &mut track.borrow_mut());
+        Ok(())
+    })
+    .unwrap();
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::write(&path, text).unwrap();
+    let figures = lines.finish(path.to_str().unwrap(), PROGRAMS, &track.borrow(), |_| ()).unwrap();
+    figures.cuts.unwrap()
+}
+
+#[test]
+fn errors_against_another_program_contain_the_distance_of_its_path() {
+    // A slow cut on a line 50 µm beside that of the reference, after a rest; then away from and back to the start.
+    let program = |y: &str| {
+        format!("G21 G90 G64 P0.001\nG0 X10 Y0\nG4 P0.5\nG1 Y{y} F60\nX40 F300\nX10\nY0 F60\nG0 X0\nM2\n")
+    };
+    let [near, moved] = [program("5"), program("5.05")];
+    let own = errors_against("own.nc", [&near, &near]);
+    assert_eq!(own, run("own_path.nc", &near).program.cuts.unwrap());
+    let found = errors_against("moved.nc", [&moved, &near]);
+    assert!((found.max - 50e-6).abs() < own.max, "{found:?} {own:?}");
+    assert!(found.rms > 30e-6, "{found:?}");
+}

@@ -10,6 +10,7 @@ mod bode;
 #[path = "../../../crates/builtin/src/lib.rs"]
 mod builtin;
 mod check;
+mod compile;
 mod design;
 mod export;
 mod identify;
@@ -73,6 +74,8 @@ enum Command {
     Tune(Box<tune::TuneArguments>),
     /// Learn setpoints that compensate the repeatable errors of a motion, run after run.
     Learn(Box<learn::LearnArguments>),
+    /// Change points and feeds of a part program so that the simulated tool stays near the programmed path.
+    Compile(Box<compile::CompileArguments>),
     /// Simulate one tuning on plants with deviating inertia, friction and torque constant.
     Robustness(Box<tune::robustness::RobustnessArguments>),
     /// Identify the parameters of an axis from recordings and write a machine file.
@@ -138,6 +141,7 @@ impl Command {
             Command::Run(arguments) => arguments.output(),
             Command::Tune(arguments) => arguments.output(),
             Command::Learn(arguments) => arguments.output(),
+            Command::Compile(arguments) => arguments.output(),
             Command::Robustness(arguments) => arguments.output(),
             _ => return false,
         };
@@ -223,6 +227,7 @@ fn run_command(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Bode(arguments) => bode::run(arguments),
         Command::Tune(arguments) => tune::run(arguments),
         Command::Learn(arguments) => learn::run(arguments),
+        Command::Compile(arguments) => compile::run(arguments),
         Command::Robustness(arguments) => tune::robustness::run(arguments),
         Command::Identify(arguments) => identify::run(arguments),
         Command::Check(arguments) => check::run(arguments),

@@ -33,6 +33,6 @@ pub use pareto::pareto_front;
 pub use path_tuning::{ComparedPath, TuningResult, TuningSearch};
 pub use problem::{SearchResult, TuningCandidate, TuningProblem};
 pub use progress::{NoProgress, Progress};
-pub use robustness::{DeviatingRun, PlantDeviation, Robustness, analyze_robustness};
+pub use robustness::{DeviatingRun, PlantDeviation, Robustness, analyze_robustness, deviating_machine};
 pub use tuning::{AxisGains, Tuning};
 pub use workload::Workload;

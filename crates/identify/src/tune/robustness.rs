@@ -93,8 +93,10 @@ pub fn analyze_robustness(
     let (single, combined) = (PlantDeviation::single(by), PlantDeviation::combined(by));
     let all: Vec<PlantDeviation> = [PlantDeviation::NONE].into_iter().chain(single).chain(combined).collect();
     progress.begin("deviating plants", all.len());
-    let plants =
-        all.iter().map(|deviation| deviating(parameters, deviation)).collect::<Result<Vec<_>, _>>()?;
+    let plants = all
+        .iter()
+        .map(|deviation| deviating_machine(parameters, deviation))
+        .collect::<Result<Vec<_>, _>>()?;
     let machine = parameters.machine_config()?;
     let axes: Vec<usize> = (0..machine.axes().len()).collect();
     let allow = parameters.node_config().allow_nonzero_velocity_at_trajectory_end;
@@ -121,8 +123,14 @@ pub fn analyze_robustness(
     Ok(Robustness { worst: worst.unwrap_or_else(|| nominal.clone()), nominal, single: runs })
 }
 
-/// Returns the machine with deviating plants.
-fn deviating(parameters: &Parameters, deviation: &PlantDeviation) -> Result<MachineConfig, TuneError> {
+/// Returns the machine of `parameters` with inertia, friction and torque constant of each axis multiplied by a deviation.
+///
+/// # Errors
+/// [`TuneError`] if a factor is outside of its range.
+pub fn deviating_machine(
+    parameters: &Parameters,
+    deviation: &PlantDeviation,
+) -> Result<MachineConfig, TuneError> {
     let source = ValueSource::named("deviation");
     let mut changed = parameters.clone();
     let factors = [

@@ -22,6 +22,7 @@ mod frame;
 mod frames;
 mod ignored;
 mod limits;
+mod line_modes;
 mod line_words;
 mod macro_b;
 mod moves;
@@ -49,6 +50,7 @@ pub(crate) use encoding::read_line;
 pub use error::ProgramError;
 pub use ignored::{CodePattern, IgnoredCodes};
 pub use limits::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
+pub use line_modes::LineModes;
 pub use options::{InterpreterOptions, TipTransform};
 pub use report::{InterpretationReport, OccurrenceTable, Occurrences};
 pub use tools::{Tool, ToolTable};
@@ -130,6 +132,11 @@ impl<R: BufRead + Seek> Interpreter<R> {
     pub fn work_offset(&self) -> (usize, Coordinates) {
         let active = self.state.offsets.active;
         (active, self.state.options.work_offsets[active])
+    }
+
+    /// Returns the modes after the last line, and the programmed coordinates that it has reached.
+    pub fn line_modes(&self) -> LineModes {
+        self.state.line_modes()
     }
 
     /// Returns true for an optional line that the options skip.

@@ -2,6 +2,8 @@
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
+use std::io::Cursor;
+use std::path::PathBuf;
 
 use virtual_axes_core::config::{ControlProfile, MachineConfig, PartProgramConfig};
 use virtual_axes_core::kinematics::Kinematics;
@@ -230,11 +232,38 @@ impl<'a> PartProgramSource<'a> {
         track: &'a RefCell<ProgramTrack>,
     ) -> Result<Self, String> {
         let file = open_program(name, builtin).map_err(|error| format!("{name}: {error}"))?;
-        let subprogram_folder = program_folder(name, builtin);
-        let interpreter = options.interpreter(machine).map_err(|error| format!("{name}: {error}"))?;
-        let interpreter = InterpreterOptions { subprogram_folder, ..interpreter };
         let comments = open_program(name, builtin).and_then(comment_lines);
         let comments = comments.map_err(|error| format!("{name}: {error}"))?;
+        let folder = program_folder(name, builtin);
+        Self::with_reader(file, (name, folder), comments, machine, options, track)
+    }
+
+    /// Reads the part program `text` for a machine; `name` is the file in messages, in whose folder subprograms are searched.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the machine has invalid limits.
+    pub fn read(
+        text: &str,
+        (name, folder): (&'a str, Option<PathBuf>),
+        machine: &MachineConfig,
+        options: &'a PartProgramOptions,
+        track: &'a RefCell<ProgramTrack>,
+    ) -> Result<Self, String> {
+        let file = ProgramReader::Text(Cursor::new(text.to_owned()));
+        Self::with_reader(file, (name, folder), Vec::new(), machine, options, track)
+    }
+
+    fn with_reader(
+        file: ProgramReader,
+        (name, subprogram_folder): (&'a str, Option<PathBuf>),
+        comments: Vec<(usize, String)>,
+        machine: &MachineConfig,
+        options: &'a PartProgramOptions,
+        track: &'a RefCell<ProgramTrack>,
+    ) -> Result<Self, String> {
+        let interpreter = options.interpreter(machine).map_err(|error| format!("{name}: {error}"))?;
+        let interpreter = InterpreterOptions { subprogram_folder, ..interpreter };
         track.replace(ProgramTrack { comments, ..ProgramTrack::default() });
         let interpreter = Interpreter::new(file, name, interpreter);
         let merges = machine.control().profile == ControlProfile::LinuxCnc;

@@ -45,6 +45,8 @@ const CORNER_RADIUS: f64 = 2e-3;
 const SMALLEST_TURN: f64 = 5e-3;
 /// Longest text of a line that is shown, characters.
 const TEXT: usize = 60;
+/// Largest change of the distance between the path positions of a program and its reference, relative to the path.
+const REFERENCE_DRIFT: f64 = 0.05;
 /// Number of bytes of a line that are read; the interpreter rejects longer lines.
 const LINE_BYTES: usize = 1 << 13;
 
@@ -223,6 +225,12 @@ pub struct LineErrors {
     poses: VecDeque<(ToolPose, Nanoseconds, ToolPose)>,
     turn: StandingTurn,
     programmed: ProgrammedPath,
+    /// Path position on the reference beyond that of the run, m; `None` without a reference.
+    reference_offset: Option<f64>,
+    /// Path position of the cycle before, m.
+    last_position: f64,
+    /// Largest contour error of each line at feed, m; `None` if they are not kept.
+    line_maxima: Option<BTreeMap<usize, f64>>,
     operations: OperationMeter,
     /// Corners that are being passed.
     corners: VecDeque<PassedCorner>,
@@ -253,12 +261,44 @@ impl LineErrors {
             passed: 0,
             turn: StandingTurn::default(),
             programmed: ProgrammedPath::default(),
+            reference_offset: None,
+            last_position: 0.0,
+            line_maxima: None,
             operations: OperationMeter::new(machine),
             corners: VecDeque::new(),
             sums: Default::default(),
             worst: Default::default(),
             last_tip: None,
             last_line: (0, 0.0),
+        }
+    }
+
+    /// Measures contour errors against the whole programmed path of another program, of which that of the run is a variant
+    /// with moved points: lines in the same order, and lengths that differ by less than 5 %.
+    #[must_use]
+    pub fn with_reference(mut self, path: ProgrammedPath) -> Self {
+        (self.programmed, self.reference_offset) = (path, Some(0.0));
+        self
+    }
+
+    /// Keeps the largest contour error of each line for [`into_cuts`](Self::into_cuts).
+    #[must_use]
+    pub(crate) fn with_line_maxima(mut self) -> Self {
+        self.line_maxima = Some(BTreeMap::new());
+        self
+    }
+
+    /// Returns the path position on the programmed path, m, of one of the run.
+    fn on_programmed(&self, path_position: f64) -> f64 {
+        path_position + self.reference_offset.unwrap_or(0.0)
+    }
+
+    /// Follows the path position on the reference.
+    fn follow_reference(&mut self, path_position: f64, found: f64) {
+        let step = (path_position - self.last_position).max(0.0) * REFERENCE_DRIFT;
+        self.last_position = path_position;
+        if let Some(offset) = &mut self.reference_offset {
+            *offset += (found - path_position - *offset).clamp(-step, step);
         }
     }
 
@@ -269,7 +309,10 @@ impl LineErrors {
         if !tick.position_instant {
             return None;
         }
-        self.programmed.append(&mut track.programmed);
+        match self.reference_offset {
+            None => self.programmed.append(&mut track.programmed),
+            Some(_) => track.programmed = ProgrammedPath::default(),
+        }
         let samples = || tick.machine.axes().iter().map(|axis| axis.sample());
         let joints: Vec<f64> = samples().map(|sample| sample.psec).collect();
         let start = PathPlace { programmed_feed: f64::INFINITY, ..PathPlace::default() };
@@ -288,7 +331,8 @@ impl LineErrors {
         if self.window.len() > WINDOW {
             self.window.pop_front();
             self.passed += 1;
-            self.programmed.drop_before(self.window[0].place.path_position - KEPT_PATH);
+            let first = self.on_programmed(self.window[0].place.path_position);
+            self.programmed.drop_before(first - KEPT_PATH);
         }
         self.plan_corners();
         self.explain(AFTER);
@@ -320,9 +364,12 @@ impl LineErrors {
         }
         let last_tip = self.last_tip.replace(actual.tip);
         drives.is_finite().then(|| {
-            let nearest_to = |tip| self.programmed.nearest(tip, path_position);
-            let blending = nearest_to(&reference).map_or(0.0, |point| (reference - point).norm());
-            reference = nearest_to(&actual.tip).unwrap_or(reference);
+            let on_programmed = self.on_programmed(path_position);
+            let nearest_to = |tip| self.programmed.nearest(tip, on_programmed);
+            let blending = nearest_to(&reference).map_or(0.0, |(point, _)| (reference - point).norm());
+            let found;
+            (reference, found) = nearest_to(&actual.tip).unwrap_or((reference, on_programmed));
+            self.follow_reference(path_position, found);
             let contour_error = (actual.tip - reference).norm();
             let TrackedSetpoint { place, tip_feed, .. } = &self.window[nearest];
             let found = CycleError {
@@ -351,7 +398,8 @@ impl LineErrors {
     fn plan_corners(&mut self) {
         let Some(newest) = self.window.back() else { return };
         let before = self.window.iter().rev().nth(1).unwrap_or(newest);
-        while let Some(corner) = self.programmed.next_corner(newest.place.path_position + CORNER_AHEAD) {
+        let ahead = newest.place.path_position + self.reference_offset.unwrap_or(0.0) + CORNER_AHEAD;
+        while let Some(corner) = self.programmed.next_corner(ahead) {
             self.corners.push_back(PassedCorner { corner, planned: f64::INFINITY, nearest: None });
         }
         for passed in &mut self.corners {
@@ -375,6 +423,7 @@ impl LineErrors {
                 passed.nearest = Some((actual, *cycle, self.passed + nearest));
             }
         }
+        let path_position = self.on_programmed(path_position);
         while self.corners.front().is_some_and(|corner| corner.is_passed(path_position)) {
             self.corners.pop_front().into_iter().for_each(|corner| self.record_corner(corner));
         }
@@ -396,6 +445,10 @@ impl LineErrors {
         let CycleError { line, time, .. } = *cycle;
         let kind = usize::from(cycle.is_rapid);
         self.sums[kind].add(cycle);
+        if let (Some(maxima), false) = (&mut self.line_maxima, cycle.is_rapid) {
+            let largest = maxima.entry(line).or_insert(0.0);
+            *largest = largest.max(cycle.contour_error);
+        }
         let (lines, error) = (&mut self.worst[kind], cycle.contour_error);
         let known = lines.iter().position(|(worst, _)| worst.line == line);
         let mut orientation = self.last_line.1;
@@ -466,6 +519,26 @@ impl LineErrors {
         }
     }
 
+    /// Evaluates the last position cycles and calls `visit` with each.
+    fn evaluate_rest(&mut self, mut visit: impl FnMut(&CycleError)) {
+        while !self.poses.is_empty() {
+            self.evaluate().iter().for_each(&mut visit);
+        }
+        for passed in std::mem::take(&mut self.corners) {
+            self.record_corner(passed);
+        }
+    }
+
+    /// Evaluates the last position cycles, calls `visit` with each, and returns the contour errors at feed: of the program,
+    /// `None` without any, and the largest of each line, m, if they are kept.
+    pub(crate) fn into_cuts(
+        mut self,
+        visit: impl FnMut(&CycleError),
+    ) -> (Option<ProgrammedErrors>, BTreeMap<usize, f64>) {
+        self.evaluate_rest(visit);
+        (self.sums[0].figures(), self.line_maxima.unwrap_or_default())
+    }
+
     /// Evaluates the last position cycles, calls `visit` with each, and returns the figures of the program with the texts of
     /// the lines from the program `name` of `builtin` or the file `name`; `track` has its times.
     ///
@@ -477,14 +550,9 @@ impl LineErrors {
         name: &str,
         builtin: &BuiltinFiles,
         track: &ProgramTrack,
-        mut visit: impl FnMut(&CycleError),
+        visit: impl FnMut(&CycleError),
     ) -> io::Result<ProgramFigures> {
-        while !self.poses.is_empty() {
-            self.evaluate().iter().for_each(&mut visit);
-        }
-        for passed in std::mem::take(&mut self.corners) {
-            self.record_corner(passed);
-        }
+        self.evaluate_rest(visit);
         self.explain(0);
         let mut operations = self.operations.finish(&track.comments);
         let numbers = self.worst.iter().flatten().map(|(worst, _)| worst.line);

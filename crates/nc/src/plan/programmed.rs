@@ -43,8 +43,8 @@ impl ProgrammedSpan {
         start + t * (slope + t * bend)
     }
 
-    /// Returns the point nearest to `tip`.
-    fn nearest(&self, tip: &Vector3<f64>) -> Vector3<f64> {
+    /// Returns the point nearest to `tip` and its path position, m.
+    fn nearest(&self, tip: &Vector3<f64>) -> (Vector3<f64>, f64) {
         let [start, slope, bend] = &self.coefficients;
         let chord = slope + bend;
         let square = chord.norm_squared();
@@ -59,7 +59,8 @@ impl ProgrammedSpan {
                 t = (t - error.dot(&first) / curvature).clamp(0.0, 1.0);
             }
         }
-        self.at(t)
+        let [from, to] = self.ends;
+        (self.at(t), from + (to - from) * t)
     }
 }
 
@@ -114,8 +115,9 @@ impl ProgrammedPath {
         }
     }
 
-    /// Returns the point of the programmed path nearest to a tool tip, m, near a path position, m; `None` for an empty path.
-    pub fn nearest(&self, tip: &Vector3<f64>, path_position: f64) -> Option<Vector3<f64>> {
+    /// Returns the point of the programmed path nearest to a tool tip, m, near a path position, m, and its own path position;
+    /// `None` for an empty path.
+    pub fn nearest(&self, tip: &Vector3<f64>, path_position: f64) -> Option<(Vector3<f64>, f64)> {
         let index = |position: f64| self.spans.partition_point(|span| span.ends[1] < position);
         let last = self.spans.len().checked_sub(1)?;
         let here = &self.spans[index(path_position).min(last)];
@@ -125,8 +127,8 @@ impl ProgrammedPath {
         let near = self.spans.range(index(path_position - reach).min(last)..);
         near.take_while(|span| span.ends[0] <= path_position + reach)
             .map(|span| span.nearest(tip))
-            .min_by(|a, b| (a - tip).norm_squared().total_cmp(&(b - tip).norm_squared()))
-            .or(Some(place))
+            .min_by(|(a, _), (b, _)| (a - tip).norm_squared().total_cmp(&(b - tip).norm_squared()))
+            .or(Some((place, path_position)))
     }
 
     /// Appends a curve that starts at a path position.

@@ -28,6 +28,7 @@ use virtual_axes_io::files::{
     self, FileKind, McapTrajectories, PsecCsvReader, PsecRow, TimeGap, read_psec_yaml,
 };
 use virtual_axes_nc::offline::{PartProgramOptions, PartProgramSource, ProgramSurvey, ProgramTrack};
+use virtual_axes_nc::plan::ProgrammedPath;
 
 /// Scenario, part program or file with setpoints.
 #[derive(Debug)]
@@ -272,6 +273,25 @@ impl CommandInput {
             gap: &self.gap,
             rows: self.rows.as_ref(),
         }))
+    }
+
+    /// Returns the programmed path of the part program `name`, read with the options of this one.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if this input is no part program, or the other is invalid.
+    pub fn path_of(&self, name: &str, machine: &MachineConfig) -> Result<ProgrammedPath, Box<dyn Error>> {
+        if !self.is_part_program() {
+            return Err(format!("{}: --reference requires a part program", self.name).into());
+        }
+        let track = RefCell::default();
+        let mut source = PartProgramSource::open(name, PROGRAMS, machine, &self.options, &track)?;
+        let mut row = vec![0.0; machine.axes().len()];
+        while source.next(&mut row).map_err(|error| -> Box<dyn Error> { error })? {
+            interrupt::check()?;
+        }
+        drop(source);
+        Ok(track.into_inner().programmed)
     }
 
     /// Interprets a part program as a whole, without planning. `on_line` receives the lines that were read.

@@ -40,6 +40,10 @@ pub struct RunArguments {
     /// Compare with a run with these parameters; can be repeated.
     #[arg(long, value_name = "KEY=VALUE[,KEY=VALUE]…")]
     compare: Vec<String>,
+    /// Measure the contour errors of a part program by line against the path of this program, of which it is a variant with
+    /// moved points, such as one of `compile`.
+    #[arg(long, value_name = "PROGRAM")]
+    reference: Option<String>,
     /// Write signals over time to this file.
     #[arg(long, value_name = "FILE.csv|FILE.mcap")]
     trace: Option<PathBuf>,
@@ -147,6 +151,10 @@ fn trial(
     let is_subsampled = trace.as_ref().is_some_and(|t| t.period % config.periods().position != 0);
     let mut summary = SetpointSummary::default();
     let mut lines = input.is_part_program().then(|| LineErrors::new(config));
+    if let Some(reference) = &arguments.reference {
+        let path = input.path_of(reference, config)?;
+        lines = lines.map(|lines| lines.with_reference(path));
+    }
     let mut path = ToolPath::default();
     let on_tick = |tick: Tick<'_>| {
         summary.add(&tick);

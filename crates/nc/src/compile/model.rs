@@ -1,0 +1,568 @@
+//! Points and feeds of a program that can be changed, and the text with changed ones.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::TAU;
+use std::io::Cursor;
+
+use nalgebra::{Matrix3, Vector2, Vector3};
+use virtual_axes_core::kinematics::Kinematics;
+use virtual_axes_core::units::MILLIMETER;
+
+use super::error::CompileError;
+use super::words::{WordLine, number, rounded};
+use crate::interpret::{Interpreter, InterpreterOptions, LineModes, TipTransform};
+use crate::motion::{
+    AXIS_COUNT, AXIS_LETTERS, Coordinates, Feed, MotionKind, PathControl, PlanarArc, ProgramEvent,
+    ProgramMotion, ProgramStep, is_rotary,
+};
+
+/// Words of the center of an arc by its axis.
+const CENTERS: [char; 3] = ['I', 'J', 'K'];
+/// Change of direction from which a junction is a corner, rad.
+const CORNER_TURN: f64 = 0.05;
+/// Distance from a corner within which errors are those of the corner, m.
+const CORNER_REACH: f64 = 3e-3;
+/// Weight of the size of the shift of a corner beside its errors.
+const CORNER_WEIGHT: f64 = 0.1;
+/// Part of a line within which extra points are placed from each of its ends.
+const SPLIT_PART: f64 = 0.4;
+/// Difference of the tool tip from the coordinates that counts as the same on all lines, m.
+const SAME: f64 = 1e-8;
+/// Largest difference of an end of a motion from the planned one after rounding, m and rad.
+const ROUNDING: f64 = 4e-7;
+/// Sweep of a whole turn, and the least one of an arc whose radius is corrected, rad.
+const WHOLE_TURN: f64 = TAU - 1e-6;
+const LEAST_SWEEP: f64 = 0.2;
+/// Distance of the sweep from half a turn within which an arc by R is not changed, rad.
+const HALF_TURN_MARGIN: f64 = 0.2;
+
+/// End of a part of a cut.
+#[derive(Debug, Clone)]
+pub(super) struct CutPoint {
+    programmed: Coordinates,
+    at: Coordinates,
+    /// Tool tip in the workpiece frame, m.
+    pub tip: Vector3<f64>,
+    /// True if the point is not moved.
+    pub is_fixed: bool,
+}
+
+/// Curve of a piece.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum CutShape {
+    Line,
+    Arc(PlanarArc),
+}
+
+/// Cut, or part of a cut with extra points.
+#[derive(Debug, Clone)]
+pub(super) struct CutPiece {
+    /// Motion, and source line from 1.
+    motion: usize,
+    pub line: usize,
+    pub from: usize,
+    pub to: usize,
+    pub shape: CutShape,
+}
+
+/// Changes of the points and feeds of a program.
+#[derive(Debug, Clone)]
+pub(super) struct Changes {
+    /// Shift of each node, m.
+    pub shifts: Vec<Vector3<f64>>,
+    /// Change of the radius of each piece, m.
+    pub radii: Vec<f64>,
+    /// Factor of the feed of each piece.
+    pub feeds: Vec<f64>,
+}
+
+/// Text of a changed program.
+pub(super) struct ChangedProgram {
+    pub text: String,
+    /// CutPiece of each line, and its source line, from 1.
+    pub pieces: Vec<Option<usize>>,
+    pub sources: Vec<usize>,
+}
+
+/// Program with the cuts that can be changed.
+pub(super) struct ProgramModel {
+    lines: Vec<String>,
+    line_end: &'static str,
+    motions: Vec<(ProgramMotion, LineModes)>,
+    events: Vec<ProgramEvent>,
+    words: BTreeMap<usize, WordLine>,
+    pub nodes: Vec<CutPoint>,
+    pub pieces: Vec<CutPiece>,
+    /// Pieces of each line that is changed, in order.
+    by_line: BTreeMap<usize, std::ops::Range<usize>>,
+    /// First and last line of each sequence of changed lines.
+    chains: Vec<[usize; 2]>,
+    /// Number of lines at feed that are not changed, by reason.
+    pub left: BTreeMap<&'static str, usize>,
+}
+
+/// Steps of a program.
+type Steps = (Vec<(ProgramMotion, LineModes)>, Vec<ProgramEvent>);
+
+/// Interprets a program.
+fn steps(text: &str, name: &str, options: &InterpreterOptions) -> Result<Steps, CompileError> {
+    let mut interpreter = Interpreter::new(Cursor::new(text), name, options.clone());
+    let (mut motions, mut events) = (Vec::new(), Vec::new());
+    while let Some(step) = interpreter.next() {
+        match step.map_err(|error| CompileError::Program(error.to_string()))? {
+            ProgramStep::Motion(motion) => motions.push((motion, interpreter.line_modes())),
+            ProgramStep::Event { event, .. } => events.push(event),
+        }
+    }
+    Ok((motions, events))
+}
+
+impl ProgramModel {
+    /// Reads a program; lines of `left_out` are not changed, and extra points are placed at `distances` from corners, m.
+    ///
+    /// # Errors
+    ///
+    /// An invalid program.
+    pub fn read(
+        (text, name): (&str, &str),
+        (options, kinematics): (&InterpreterOptions, &Kinematics),
+        distances: &[f64],
+        left_out: &BTreeSet<usize>,
+    ) -> Result<Self, CompileError> {
+        let line_end = if text.contains("\r\n") { "\r\n" } else { "\n" };
+        let lines: Vec<String> = text.replace("\r\n", "\n").split('\n').map(str::to_owned).collect();
+        let (motions, events) = steps(text, name, options)?;
+        let mut model = Self {
+            lines,
+            line_end,
+            motions,
+            events,
+            words: BTreeMap::new(),
+            nodes: Vec::new(),
+            pieces: Vec::new(),
+            by_line: BTreeMap::new(),
+            chains: Vec::new(),
+            left: BTreeMap::new(),
+        };
+        let editable = model.editable(left_out);
+        let mut from = 0;
+        while from < editable.len() {
+            let mut to = from + 1;
+            if editable[from] {
+                while to < editable.len() && editable[to] && model.follows(to) {
+                    to += 1;
+                }
+                model.add_chain(from..to, options.kinematics.as_ref(), kinematics, distances);
+            }
+            from = to;
+        }
+        Ok(model)
+    }
+
+    /// Returns for each motion whether its line can be changed.
+    fn editable(&mut self, left_out: &BTreeSet<usize>) -> Vec<bool> {
+        let mut count: BTreeMap<usize, usize> = BTreeMap::new();
+        self.motions.iter().for_each(|(motion, _)| *count.entry(motion.line).or_default() += 1);
+        // A return alone in the middle of a text ends a line for the interpreter.
+        let has_lines = !self.lines.iter().any(|line| line.contains('\r'));
+        let mut reasons: BTreeMap<usize, &'static str> = BTreeMap::new();
+        for (motion, modes) in &self.motions {
+            if motion.feed == Feed::Rapid {
+                continue;
+            }
+            let words = self.lines.get(motion.line - 1).filter(|_| has_lines);
+            let words = words.and_then(|line| WordLine::read(line));
+            let half = |arc: &PlanarArc| (arc.sweep.abs() - TAU / 2.0).abs() < HALF_TURN_MARGIN;
+            let reason = match (&motion.kind, words) {
+                _ if count.get(&motion.line) != Some(&1) => "executed more than once, or several motions",
+                _ if !modes.is_plain || !matches!(motion.feed, Feed::Linear(_)) => {
+                    "cycle, probing, compensation, rotation, scaling or feed that is not per minute"
+                }
+                (MotionKind::Nurbs(_) | MotionKind::Rapid, _) => "spline",
+                (_, None) => "words that are no literal numbers, or other codes",
+                (MotionKind::Arc(arc), Some(words)) if words.has('R') && half(arc) => "half turn by R",
+                _ if left_out.contains(&motion.line) => "position used elsewhere in the program",
+                (_, Some(words)) => {
+                    self.words.insert(motion.line, words);
+                    continue;
+                }
+            };
+            reasons.insert(motion.line, reason);
+        }
+        reasons.values().for_each(|reason| *self.left.entry(reason).or_default() += 1);
+        self.motions
+            .iter()
+            .map(|(motion, _)| self.words.contains_key(&motion.line) && !reasons.contains_key(&motion.line))
+            .collect()
+    }
+
+    /// Returns true if a motion follows that before it with nothing but comments between their lines.
+    fn follows(&self, index: usize) -> bool {
+        let [before, line] = [index - 1, index].map(|index| self.motions[index].0.line);
+        before < line && self.lines[before..line - 1].iter().all(|text| WordLine::is_comment(text))
+    }
+
+    fn add_chain(
+        &mut self,
+        chain: std::ops::Range<usize>,
+        transform: Option<&TipTransform>,
+        kinematics: &Kinematics,
+        distances: &[f64],
+    ) {
+        let tip = |at: &Coordinates, tcp: Option<f64>| match transform {
+            Some(transform) => kinematics.forward(&transform.joints(at, tcp)).tip,
+            None => Vector3::from_column_slice(&at[..3]),
+        };
+        let offset = |at: &Coordinates, tcp| tip(at, tcp) - Vector3::from_column_slice(&at[..3]);
+        let first = &self.motions[chain.start].0;
+        let place = offset(&first.start, first.tcp_length);
+        let is_shifted = self.motions[chain.clone()]
+            .iter()
+            .all(|(motion, _)| (offset(&motion.end, motion.tcp_length) - place).norm() < SAME);
+        let node = |at: Coordinates, motion: &ProgramMotion, modes: &LineModes, is_fixed: bool| CutPoint {
+            programmed: std::array::from_fn(|axis| modes.programmed[axis] + at[axis] - motion.end[axis]),
+            tip: tip(&at, motion.tcp_length),
+            at,
+            is_fixed: is_fixed || !is_shifted,
+        };
+        let (motion, modes) = &self.motions[chain.start];
+        self.nodes.push(node(motion.start, motion, modes, true));
+        self.chains.push([motion.line, self.motions[chain.end - 1].0.line]);
+        for index in chain.clone() {
+            let (motion, modes) = &self.motions[index];
+            let begins = self.pieces.len();
+            let is_last = index + 1 == chain.end;
+            let shape = match motion.kind {
+                MotionKind::Arc(arc) => CutShape::Arc(arc),
+                _ => CutShape::Line,
+            };
+            let mut places = vec![1.0];
+            if let (CutShape::Line, PathControl::Blend(_), true) = (shape, motion.path_control, is_shifted) {
+                let length = (direction(motion, true).1).norm();
+                let near: Vec<f64> = distances
+                    .iter()
+                    .map(|distance| distance / length)
+                    .filter(|part| *part < SPLIT_PART)
+                    .collect();
+                if index == chain.start || self.is_corner(index) {
+                    places.extend(&near);
+                }
+                if is_last || self.is_corner(index + 1) {
+                    places.extend(near.iter().map(|part| 1.0 - part));
+                }
+                places.sort_by(f64::total_cmp);
+            }
+            for place in places {
+                let at = std::array::from_fn(|axis| match place < 1.0 {
+                    true => motion.start[axis] + place * (motion.end[axis] - motion.start[axis]),
+                    false => motion.end[axis],
+                });
+                let to = self.nodes.len();
+                self.nodes.push(node(at, motion, modes, is_last && place == 1.0));
+                self.pieces.push(CutPiece { motion: index, line: motion.line, from: to - 1, to, shape });
+            }
+            self.by_line.insert(motion.line, begins..self.pieces.len());
+        }
+    }
+
+    /// Returns true if the path has a corner before a motion, or begins or ends an arc there.
+    fn is_corner(&self, index: usize) -> bool {
+        let [before, after] = [index - 1, index].map(|index| &self.motions[index].0);
+        let is_arc = |motion: &ProgramMotion| matches!(motion.kind, MotionKind::Arc(_));
+        is_arc(before)
+            || is_arc(after)
+            || direction(before, true).0.angle(&direction(after, false).0) > CORNER_TURN
+    }
+
+    /// Returns no changes.
+    pub fn unchanged(&self) -> Changes {
+        Changes {
+            shifts: vec![Vector3::zeros(); self.nodes.len()],
+            radii: vec![0.0; self.pieces.len()],
+            feeds: vec![1.0; self.pieces.len()],
+        }
+    }
+
+    /// Returns true for an arc of at least a whole turn.
+    pub fn is_whole_turn(&self, piece: usize) -> bool {
+        matches!(self.pieces[piece].shape, CutShape::Arc(arc) if arc.sweep.abs() >= WHOLE_TURN)
+    }
+
+    /// Returns the unit vector from the center of an arc to one of its ends, in three coordinates; zero for a line.
+    pub fn normal(&self, piece: usize, at_end: bool) -> Vector3<f64> {
+        let CutPiece { from, to, shape, .. } = self.pieces[piece];
+        let CutShape::Arc(arc) = shape else { return Vector3::zeros() };
+        let [first, second, _] = arc.plane.axes();
+        let at = &self.nodes[if at_end { to } else { from }].at;
+        let mut normal = Vector3::zeros();
+        (normal[first], normal[second]) = (at[first] - arc.center[0], at[second] - arc.center[1]);
+        normal.try_normalize(0.0).unwrap_or_default()
+    }
+
+    /// Returns true if a line ends at a corner with another line.
+    pub fn is_line_corner(&self, piece: usize) -> bool {
+        let (one, two) = (&self.pieces[piece], &self.pieces[piece + 1]);
+        matches!((one.shape, two.shape), (CutShape::Line, CutShape::Line))
+            && self.along(piece).angle(&self.along(piece + 1)) > CORNER_TURN
+    }
+
+    /// Returns the vector from start to end of a line, m.
+    fn along(&self, piece: usize) -> Vector3<f64> {
+        let CutPiece { from, to, .. } = self.pieces[piece];
+        self.nodes[to].tip - self.nodes[from].tip
+    }
+
+    /// Returns the shift of the corner at the end of a line that has the largest errors normal to both lines near it, by
+    /// least squares.
+    pub fn corner_error(&self, piece: usize, tips: [&[(usize, Vector3<f64>)]; 2]) -> Vector3<f64> {
+        let mut matrix = Matrix3::identity() * CORNER_WEIGHT;
+        let mut error = Vector3::zeros();
+        for (piece, is_end, tips) in [(piece, true, tips[0]), (piece + 1, false, tips[1])] {
+            let along = self.along(piece).try_normalize(0.0).unwrap_or_default();
+            matrix += Matrix3::identity() - along * along.transpose();
+            error += self.largest_error(piece, is_end, tips);
+        }
+        matrix.try_inverse().unwrap_or_default() * error
+    }
+
+    /// Returns the largest error vector normal to a line near one of its ends.
+    fn largest_error(&self, piece: usize, at_end: bool, tips: &[(usize, Vector3<f64>)]) -> Vector3<f64> {
+        let along = self.along(piece);
+        let length = along.norm();
+        let along = along.try_normalize(0.0).unwrap_or_default();
+        let start = self.nodes[self.pieces[piece].from].tip;
+        let error = |(_, tip): &(usize, Vector3<f64>)| {
+            let place = (tip - start).dot(&along);
+            let distance = if at_end { length - place } else { place };
+            (0.0..=CORNER_REACH.min(length)).contains(&distance).then(|| tip - start - along * place)
+        };
+        let larger = |a: &Vector3<f64>, b: &Vector3<f64>| a.norm_squared().total_cmp(&b.norm_squared());
+        tips.iter().filter_map(error).max_by(larger).unwrap_or_default()
+    }
+
+    /// Returns the center of an arc in the workpiece frame, its radius, m, and the axes of its plane.
+    pub fn circle(&self, piece: usize) -> Option<(Vector3<f64>, f64, [usize; 2])> {
+        let CutPiece { from, shape, .. } = self.pieces[piece];
+        let CutShape::Arc(arc) = shape else { return None };
+        let [first, second, _] = arc.plane.axes();
+        let node = &self.nodes[from];
+        let mut center = node.tip;
+        center[first] += arc.center[0] - node.at[first];
+        center[second] += arc.center[1] - node.at[second];
+        let radius = (node.at[first] - arc.center[0]).hypot(node.at[second] - arc.center[1]);
+        (arc.sweep.abs() > LEAST_SWEEP).then_some((center, radius, [first, second]))
+    }
+
+    /// Writes the program with changes.
+    pub fn write(&self, changes: &Changes) -> ChangedProgram {
+        let mut out = Vec::new();
+        let (mut pieces, mut sources) = (Vec::new(), Vec::new());
+        let mut carried = [0.0; AXIS_COUNT];
+        let mut feed = 0.0;
+        for (line, text) in (1..).zip(&self.lines) {
+            let (Some(range), Some(words)) = (self.by_line.get(&line), self.words.get(&line)) else {
+                out.push(text.clone());
+                pieces.push(None);
+                sources.push(line);
+                continue;
+            };
+            let modes = &self.motions[self.pieces[range.start].motion].1;
+            if self.chains.iter().any(|[first, _]| *first == line) {
+                carried = self.nodes[self.pieces[range.start].from].programmed;
+                feed = modes.feed_word;
+            }
+            for piece in range.clone() {
+                let is_first = piece == range.start;
+                let mut numbers = self.points(piece, changes, words, &mut carried, is_first);
+                let decimals = words.decimals('F').max(if modes.unit == MILLIMETER { 1 } else { 3 });
+                let wanted = match changes.feeds[piece] {
+                    1.0 => modes.feed_word,
+                    factor => rounded(modes.feed_word * factor, decimals),
+                };
+                let is_given = is_first && words.has('F');
+                if wanted != if is_given { modes.feed_word } else { feed } {
+                    numbers.push(('F', number(wanted, decimals)));
+                }
+                feed = wanted;
+                out.push(match is_first {
+                    true => words.with(&numbers),
+                    false => {
+                        numbers.iter().map(|(letter, n)| format!("{letter}{n}")).collect::<Vec<_>>().join(" ")
+                    }
+                });
+                pieces.push(Some(piece));
+                sources.push(line);
+            }
+            if self.chains.iter().any(|[_, last]| *last == line) && feed != modes.feed_word {
+                out.push(format!("F{}", number(modes.feed_word, 6)));
+                pieces.push(None);
+                sources.push(line);
+            }
+        }
+        ChangedProgram { text: out.join(self.line_end), pieces, sources }
+    }
+
+    /// Returns the words of the end and the center of a piece; `carried` are the programmed coordinates before and after it.
+    fn points(
+        &self,
+        piece: usize,
+        changes: &Changes,
+        words: &WordLine,
+        carried: &mut Coordinates,
+        is_first: bool,
+    ) -> Vec<(char, String)> {
+        let CutPiece { motion, from, to, shape, .. } = self.pieces[piece];
+        let modes = &self.motions[motion].1;
+        let least = if modes.unit == MILLIMETER { 4 } else { 5 };
+        let start = *carried;
+        let mut numbers = Vec::new();
+        for (axis, letter) in AXIS_LETTERS.into_iter().enumerate() {
+            let unit = if is_rotary(axis) { virtual_axes_core::units::DEGREE } else { modes.unit };
+            let decimals = words.decimals(letter).max(least);
+            let shift = if axis < 3 { changes.shifts[to][axis] } else { 0.0 };
+            let target = self.nodes[to].programmed[axis] + shift;
+            let base = if modes.is_incremental { carried[axis] } else { 0.0 };
+            let moves = (target - carried[axis]).abs() > 0.5 * 0.1_f64.powi(decimals as i32) * unit;
+            let given = words.value(letter).filter(|_| is_first);
+            let value = (target - base) / unit;
+            match given {
+                Some(given) if (value - given).abs() < 1e-9 => carried[axis] = target,
+                Some(_) => {
+                    numbers.push((letter, number(value, decimals)));
+                    carried[axis] = base + rounded(value, decimals) * unit;
+                }
+                None if moves => {
+                    numbers.push((letter, number(value, decimals)));
+                    carried[axis] = base + rounded(value, decimals) * unit;
+                }
+                None => {}
+            }
+        }
+        let CutShape::Arc(arc) = shape else { return numbers };
+        let center = self.center(piece, &arc, changes);
+        let [first, second, _] = arc.plane.axes();
+        if let Some(radius) = words.value('R') {
+            let end = &self.nodes[to];
+            let at = [first, second].map(|axis| end.at[axis] + changes.shifts[to][axis]);
+            let new = (at[0] - center[0]).hypot(at[1] - center[1]) / modes.unit * radius.signum();
+            if changes.radii[piece] != 0.0 || changes.shifts[from] != changes.shifts[to] {
+                numbers.push(('R', number(new, words.decimals('R').max(least))));
+            }
+            return numbers;
+        }
+        let node = &self.nodes[from];
+        for (axis, center) in [first, second].into_iter().zip(center) {
+            let letter = CENTERS[axis];
+            let decimals = words.decimals(letter).max(least);
+            let programmed = node.programmed[axis] - node.at[axis] + center;
+            let base = if modes.has_absolute_centers { 0.0 } else { start[axis] };
+            let value = (programmed - base) / modes.unit;
+            let tolerance = 0.5 * 0.1_f64.powi(decimals as i32);
+            if (value - words.value(letter).unwrap_or(0.0)).abs() > tolerance {
+                numbers.push((letter, number(value, decimals)));
+            }
+        }
+        numbers
+    }
+
+    /// Returns the center of a changed arc, in its plane: through both ends, and for a part of a turn through its middle.
+    fn center(&self, piece: usize, arc: &PlanarArc, changes: &Changes) -> [f64; 2] {
+        let CutPiece { from, to, .. } = self.pieces[piece];
+        let [first, second, _] = arc.plane.axes();
+        let center = Vector2::from(arc.center);
+        let plane = |vector: &Vector3<f64>| Vector2::new(vector[first], vector[second]);
+        let (start, end) = (plane(&changes.shifts[from]), plane(&changes.shifts[to]));
+        if self.is_whole_turn(piece) {
+            let moved = center + start - plane(&self.normal(piece, false)) * changes.radii[piece];
+            return moved.into();
+        }
+        let at = |node: usize| Vector2::new(self.nodes[node].at[first], self.nodes[node].at[second]);
+        let middle = nalgebra::Rotation2::new(0.5 * arc.sweep) * (at(from) - center);
+        let raised = match arc.sweep.abs() > LEAST_SWEEP {
+            true => middle.normalize() * changes.radii[piece],
+            false => 0.5 * (start + end),
+        };
+        let (a, b, c) = (at(from) + start, center + middle + raised, at(to) + end);
+        through(a, b, c).unwrap_or(arc.center)
+    }
+
+    /// Interprets a changed program and compares it with the planned changes. Returns the source line of the first motion
+    /// that differs.
+    pub fn verify(
+        &self,
+        changed: &ChangedProgram,
+        changes: &Changes,
+        name: &str,
+        options: &InterpreterOptions,
+    ) -> Result<(), usize> {
+        let (motions, events) = steps(&changed.text, name, options).map_err(|_| 0_usize)?;
+        let mut found = motions.iter();
+        let mut last = 0;
+        for (motion, _) in &self.motions {
+            let ends: Vec<(Coordinates, Option<usize>)> = match self.by_line.get(&motion.line) {
+                Some(range) => range.clone().map(|piece| (self.end(piece, changes), Some(piece))).collect(),
+                None => vec![(motion.end, None)],
+            };
+            for (end, piece) in ends {
+                let Some((new, _)) = found.next() else { return Err(last) };
+                let is_near = end.iter().zip(&new.end).all(|(wanted, end)| (wanted - end).abs() < ROUNDING);
+                let is_same = std::mem::discriminant(&motion.kind) == std::mem::discriminant(&new.kind)
+                    && motion.path_control == new.path_control
+                    && motion.tcp_length == new.tcp_length;
+                let has_feed = match (motion.feed, new.feed, piece) {
+                    (Feed::Linear(old), Feed::Linear(new), Some(piece)) => {
+                        (new / old / changes.feeds[piece] - 1.0).abs() < 0.02
+                    }
+                    (old, new, _) => old == new,
+                };
+                if !is_near || !is_same || !has_feed {
+                    return Err(motion.line);
+                }
+                last = motion.line;
+            }
+        }
+        if found.next().is_some() || events != self.events { Err(last) } else { Ok(()) }
+    }
+
+    fn end(&self, piece: usize, changes: &Changes) -> Coordinates {
+        let to = self.pieces[piece].to;
+        let shift = changes.shifts[to];
+        std::array::from_fn(|axis| self.nodes[to].at[axis] + if axis < 3 { shift[axis] } else { 0.0 })
+    }
+
+    /// Returns a text with the number of its line.
+    pub fn line(&self, line: usize) -> &str {
+        self.lines.get(line.saturating_sub(1)).map_or("", |text| text.trim())
+    }
+}
+
+/// Returns the unit vector along the path at an end of a motion, and the chord of the motion, m.
+fn direction(motion: &ProgramMotion, at_end: bool) -> (Vector3<f64>, Vector3<f64>) {
+    let [start, end] = [&motion.start, &motion.end].map(|at| Vector3::from_column_slice(&at[..3]));
+    let chord = end - start;
+    let tangent = match &motion.kind {
+        MotionKind::Arc(arc) => {
+            let [first, second, normal] = arc.plane.axes();
+            let at = if at_end { end } else { start };
+            let turn = arc.sweep.signum();
+            let mut tangent = Vector3::zeros();
+            tangent[first] = -turn * (at[second] - arc.center[1]);
+            tangent[second] = turn * (at[first] - arc.center[0]);
+            tangent[normal] = chord[normal] / arc.sweep.abs();
+            tangent
+        }
+        _ => chord,
+    };
+    (tangent.try_normalize(0.0).unwrap_or_default(), chord)
+}
+
+/// Returns the center of the circle through three points; `None` on a line.
+fn through(a: Vector2<f64>, b: Vector2<f64>, c: Vector2<f64>) -> Option<[f64; 2]> {
+    let (b, c) = (b - a, c - a);
+    let cross = 2.0 * b.perp(&c);
+    if cross.abs() < f64::MIN_POSITIVE {
+        return None;
+    }
+    let (bb, cc) = (b.norm_squared(), c.norm_squared());
+    Some([a.x + (c.y * bb - b.y * cc) / cross, a.y + (b.x * cc - c.x * bb) / cross])
+}
