@@ -16,7 +16,7 @@ use super::presliding::fit_presliding;
 use super::production::identify_production;
 use super::refine::RefinedParameter;
 use super::route::takes_steps;
-use super::sanity::report_invalid;
+use super::sanity::{report_invalid, report_unstated};
 use super::segments::{MotionSegment, SegmentKind, find_segments};
 use super::setpoints::stride;
 use super::trace_experiments::trace_experiments;
@@ -321,6 +321,7 @@ impl<'a> IdentificationSteps<'a> {
         self.found.replayed_inertia = replayed;
         report_result(self.inputs, seconds(self.periods.position), &mut self.found);
         report_invalid(self.inputs, self.options.stated, &mut self.found);
+        report_unstated(self.options.stated, &mut self.found);
         self.found
     }
 }
