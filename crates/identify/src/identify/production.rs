@@ -527,8 +527,8 @@ fn report_loop(fit: &LoopFit, before: &AxisConfig, found: &mut Identification) {
     found.findings.push(if with_given < fit.rms {
         Finding::warning(
             "gain-does-not-fit",
-            format!("{what}: the fit of gains and delays has not converged"),
-            "check --trace-filter-hz and the periods, or give the servo gain of the control by --set and --refine without gain",
+            format!("{what}: the fitted gain is no better"),
+            "check --trace-filter-hz and the periods; give the servo gain of the control by --set, with --refine without gain",
         )
     } else if (gain / given - 1.0).abs() > GAIN_CHANGE {
         Finding::warning(

@@ -200,7 +200,10 @@ impl<'a> IdentificationSteps<'a> {
         if recordings.is_empty() {
             found.findings.push(Finding::missing(
                 "no-current",
-                "no recording contains a current: friction, gravity and inertia are identified from positions only",
+                match self.inputs.iter().any(|input| input.signals.spans.iter().any(|span| span.psec.is_some())) {
+                    true => "no recording contains a current: friction, gravity and inertia are identified from positions only",
+                    false => "no friction, gravity and inertia: no recording contains a current",
+                },
                 "record the motor current",
             ));
             return;

@@ -45,7 +45,7 @@ pub struct IdentifiedValue {
 impl IdentifiedValue {
     /// Returns the comment behind the value in a machine file.
     pub fn comment(&self) -> String {
-        let mut text = String::from("identified: ");
+        let mut text = String::from(if self.is_significant { "identified: " } else { "estimated: " });
         match (self.interval, self.error) {
             (Some([low, high]), _) => text += &format!("{} … {} {}, ", number(low), number(high), self.unit),
             (None, Some(error)) => text += format!("± {error:.1e} {}", self.unit).trim_end(),

@@ -181,6 +181,10 @@ fn one_move_is_singular() {
     let values = found.values(&parameters, "x");
     let inertia = values.iter().find(|value| value.key == "x.motor.inertia_kg_m2").expect("an inertia");
     assert_eq!(inertia.source, "regression of the current (1 move)");
+    for value in &values {
+        let text = value.comment();
+        assert_eq!(text.starts_with("identified"), value.is_significant, "{text}");
+    }
 }
 
 #[test]
