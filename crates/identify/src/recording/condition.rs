@@ -312,8 +312,10 @@ fn select_current_lag(
     }
     if lag.is_better {
         let what = format!(
-            "{name}: the current seems to lag the motion by {milliseconds:.2} ms, no more than a sampling period \
-             of {} ms; it is not compensated",
+            "{name}: the current seems to {} the motion by {:.2} ms, no more than a sampling period of {} ms; it is not \
+             compensated",
+            if milliseconds < 0.0 { "lead" } else { "lag" },
+            milliseconds.abs(),
             Rounded(period * 1e3)
         );
         findings.push(Finding::note(CODE, what));
