@@ -113,7 +113,8 @@ impl AxisValidation {
         periods: &Periods,
         joint: Option<f64>,
     ) -> Result<Self, AxisIdentificationError> {
-        if recorded.feedforward.is_none() {
+        let has_setpoints = recorded.signals.spans.iter().any(|span| span.psec.is_some());
+        if recorded.feedforward.is_none() && has_setpoints {
             let mut best: Option<(f64, FeedforwardMode)> = None;
             for mode in FeedforwardMode::ALL {
                 recorded.feedforward = Some(mode);

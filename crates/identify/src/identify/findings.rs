@@ -157,14 +157,32 @@ pub(super) fn report_aliased_current(
         findings.push(Finding::warning(
             "unseen-current",
             format!(
-                "{}: sampled every {cycles} position cycles of {} ms, at one phase of the ripple of the current: unless the \
+                "{}: sampled every {} of {} ms{}, at one phase of the ripple of the current: unless the \
                  control filters the current, inertia and friction can be wrong by more than 10 %",
                 signals.name,
-                Rounded(tsp / MILLISECOND)
+                if cycles == 1 { "position cycle".to_owned() } else { format!("{cycles} position cycles") },
+                Rounded(tsp / MILLISECOND),
+                match has_no_setpoints(signals) {
+                    true => ", which is that of the initial machine and not seen in the recording",
+                    false => "",
+                }
             ),
             "record at a period that is no multiple of the position cycle; give --trace-filter-hz if the control filters all \
              signals but PSEC",
         ));
+    }
+}
+
+/// Returns true if no part of the recording has setpoints, which show the position cycle.
+fn has_no_setpoints(signals: &Signals) -> bool {
+    signals.spans.iter().all(|span| span.psec.is_none())
+}
+
+/// Returns the position cycle `tsp`, s, in words if it is assumed.
+fn assumed_cycle(is_assumed: bool, tsp: f64) -> String {
+    match is_assumed {
+        true => format!(" (of the initial machine, {} ms)", Rounded(tsp / MILLISECOND)),
+        false => String::new(),
     }
 }
 
@@ -268,7 +286,7 @@ fn report_inertia(inputs: &[IdentificationInput<'_>], tsp: f64, found: &mut Iden
         let of_it = by_steps.instants.iter().filter(|instant| instant.0 == number);
         let mut values: Vec<f64> = of_it.map(|instant| instant.2).collect();
         if !values.is_empty() {
-            coarse |= input.signals.period > COARSE * tsp;
+            coarse |= tsp > SHORT_CYCLE && input.signals.period > COARSE * tsp;
             parts.push((median(&mut values).unwrap_or(f64::NAN), input.signals.name.as_str()));
         }
     }
@@ -280,8 +298,9 @@ fn report_inertia(inputs: &[IdentificationInput<'_>], tsp: f64, found: &mut Iden
     }
     let values: Vec<String> = parts.iter().map(|(value, name)| format!("{value:.4} ({name})")).collect();
     let what = format!(
-        "the current varies within a position cycle, and the recording samples one phase of it only: \
+        "the current varies within a position cycle{}, and the recording samples one phase of it only: \
          Prévost eq. 5 gives an inertia of {}",
+        assumed_cycle(inputs.iter().all(|input| has_no_setpoints(input.signals)), tsp),
         values.join(", ")
     );
     found.findings.push(if refined {

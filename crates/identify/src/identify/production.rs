@@ -46,6 +46,8 @@ const FITTED: f64 = 20.0;
 /// Part of the sampling period by which interpolated setpoints can move β and γ: they do not show where in a period the
 /// acceleration changes.
 const INTERPOLATED: f64 = 0.125;
+/// Least bound of the error of interpolated setpoints that is printed, µm and mdeg.
+const LEAST_BOUND: f64 = 0.1;
 /// Standard errors of a value within its interval.
 const INTERVAL: f64 = 2.0;
 
@@ -65,14 +67,14 @@ pub(super) fn identify_production(
         return;
     }
     let signals: Vec<&Signals> = inputs.iter().map(|input| input.signals).collect();
-    if !moves_both_ways(&signals) {
+    let has_current = signals.iter().any(|signals| signals.spans.iter().any(|span| span.current.is_some()));
+    if has_current && !moves_both_ways(&signals) {
         found.findings.push(Finding::warning(
             "one-direction",
             "the axis moves in one direction only: the shape of the friction and the standstills alone separate friction and gravity",
             "record each speed in both directions",
         ));
     }
-    let has_current = signals.iter().any(|signals| signals.spans.iter().any(|span| span.current.is_some()));
     let plant = fit_plant(&signals, &found.axis, None);
     if let Some(plant) = &plant {
         apply_plant(plant, found);
@@ -304,7 +306,8 @@ fn report_interpolation(inputs: &[IdentificationInput<'_>], tsp: f64, found: &mu
                 "{}: sampled every {} ms, PSEC is interpolated at the position cycles, with an error of at most about {:.1} {name} RMS",
                 input.signals.name,
                 Rounded(input.signals.period / MILLISECOND),
-                error / unit
+                // 0.0 would be no bound.
+                (error / unit).max(LEAST_BOUND)
             ),
         ));
     }
@@ -418,7 +421,7 @@ fn apply_loop(fit: &LoopFit, (before, uncertainty): (&AxisConfig, f64), found: &
         found.findings.push(Finding::warning(
             "lag-between-cycles",
             format!(
-                "the lag of {:.2} ms at constant velocity is no whole number of position cycles of {} ms: feedforward.velocity \
+                "the fitted lag of {:.2} ms is no whole number of position cycles of {} ms: feedforward.velocity \
                  {:.4} in place of {:.4} represents the rest",
                 of(LoopParameter::Lag).map_or(f64::NAN, |lag| lag.value / MILLISECOND),
                 Rounded(tsp / MILLISECOND),
@@ -521,7 +524,13 @@ fn report_loop(fit: &LoopFit, before: &AxisConfig, found: &mut Identification) {
         gain / POSITION_GAIN,
         fit.rms / unit
     );
-    found.findings.push(if (gain / given - 1.0).abs() > GAIN_CHANGE {
+    found.findings.push(if with_given < fit.rms {
+        Finding::warning(
+            "gain-does-not-fit",
+            format!("{what}: the fitted gain is no better"),
+            "check --trace-filter-hz and the periods; give the servo gain of the control by --set, with --refine without gain",
+        )
+    } else if (gain / given - 1.0).abs() > GAIN_CHANGE {
         Finding::warning(
             "gain-does-not-fit",
             what,

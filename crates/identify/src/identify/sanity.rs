@@ -5,8 +5,8 @@ use super::identification::Identification;
 use super::options::IdentificationInput;
 use super::validate::Agreement;
 use crate::recording::{Finding, Severity, Signals, StatedValues};
-use virtual_axes_core::config::{AxisConfig, AxisUnits};
-use virtual_axes_core::units::{MILLISECOND_NS, POSITION_GAIN, RPM, Rounded};
+use virtual_axes_core::config::{AxisConfig, AxisKind, AxisUnits};
+use virtual_axes_core::units::{MILLIMETER, MILLISECOND_NS, POSITION_GAIN, REVOLUTION, RPM, Rounded};
 
 /// Largest factor between an identified value and that of the machine file.
 const LARGEST_FACTOR: f64 = 3.0;
@@ -69,6 +69,39 @@ pub(super) fn report_invalid(
         invalid.extend(too_fast(input.signals, after).filter(|_| stated.motor_speed));
     }
     found.findings.extend(invalid);
+}
+
+/// Reports torque constant and screw lead of the initial machine that the user has not stated and no recording shows: the
+/// results depend on them.
+pub(super) fn report_unstated(stated: StatedValues, found: &mut Identification) {
+    let axis = &found.axis;
+    let ratio = axis.transmission_ratio.abs();
+    let is_linear = axis.kind() == AxisKind::Linear;
+    // Linear motors have no transmission.
+    let is_linear_motor = is_linear && ratio == 1.0;
+    let mut assumed = Vec::new();
+    if !stated.torque_constant && found.torque_constant.is_none() && found.friction.is_some() {
+        let (name, unit) = if is_linear_motor { ("force", "N/A") } else { ("torque", "N·m/A") };
+        assumed.push(format!("{name} constant of {} {unit}", Rounded(axis.motor.torque_constant)));
+    }
+    let has_results = found.friction.is_some() || found.feedforward.velocity.is_some();
+    if !stated.transmission && has_results && is_linear && !is_linear_motor {
+        assumed.push(format!("screw lead of {} mm", Rounded(ratio * REVOLUTION / MILLIMETER)));
+    }
+    if assumed.is_empty() {
+        return;
+    }
+    found.findings.push(Finding::warning(
+        "unstated-scale",
+        format!(
+            "the {} of the initial machine {} assumed: inertia, weight, gain of the velocity loop and weights of a feedforward \
+             recorded at the motor depend on {}",
+            assumed.join(" and the "),
+            if assumed.len() > 1 { "are" } else { "is" },
+            if assumed.len() > 1 { "them" } else { "it" }
+        ),
+        "give those of the machine by --set",
+    ));
 }
 
 /// Returns findings on an agreement that is no result: a position worse than a constant lag, or an unexplained current.

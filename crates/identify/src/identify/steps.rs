@@ -16,7 +16,7 @@ use super::presliding::fit_presliding;
 use super::production::identify_production;
 use super::refine::RefinedParameter;
 use super::route::takes_steps;
-use super::sanity::report_invalid;
+use super::sanity::{report_invalid, report_unstated};
 use super::segments::{MotionSegment, SegmentKind, find_segments};
 use super::setpoints::stride;
 use super::trace_experiments::trace_experiments;
@@ -200,7 +200,10 @@ impl<'a> IdentificationSteps<'a> {
         if recordings.is_empty() {
             found.findings.push(Finding::missing(
                 "no-current",
-                "no recording contains a current: friction, gravity and inertia are identified from positions only",
+                match self.inputs.iter().any(|input| input.signals.spans.iter().any(|span| span.psec.is_some())) {
+                    true => "no recording contains a current: friction, gravity and inertia are identified from positions only",
+                    false => "no friction, gravity and inertia: no recording contains a current",
+                },
                 "record the motor current",
             ));
             return;
@@ -321,6 +324,7 @@ impl<'a> IdentificationSteps<'a> {
         self.found.replayed_inertia = replayed;
         report_result(self.inputs, seconds(self.periods.position), &mut self.found);
         report_invalid(self.inputs, self.options.stated, &mut self.found);
+        report_unstated(self.options.stated, &mut self.found);
         self.found
     }
 }

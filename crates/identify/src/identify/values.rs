@@ -45,7 +45,7 @@ pub struct IdentifiedValue {
 impl IdentifiedValue {
     /// Returns the comment behind the value in a machine file.
     pub fn comment(&self) -> String {
-        let mut text = String::from("identified: ");
+        let mut text = String::from(if self.is_significant { "identified: " } else { "estimated: " });
         match (self.interval, self.error) {
             (Some([low, high]), _) => text += &format!("{} … {} {}, ", number(low), number(high), self.unit),
             (None, Some(error)) => text += format!("± {error:.1e} {}", self.unit).trim_end(),
@@ -56,6 +56,11 @@ impl IdentifiedValue {
         }
         text + &self.source
     }
+}
+
+/// Returns a count with its noun, such as "1 move", "3 moves".
+fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 fn number(value: f64) -> String {
@@ -99,12 +104,14 @@ impl Identification {
                 Some(Value::Double(value)) => value,
                 _ => f64::NAN,
             };
-            let value = if interval.is_some() { value } else { rounded(value, error) };
+            // Half of the 95 % interval.
+            let half =
+                interval.map_or(error.map(|error| INTERVAL * error), |[low, high]| Some((high - low) / 2.0));
             // A value of 0 is stated as such, and an angle has no size.
-            let is_significant = interval.is_some()
-                || value == 0.0
-                || key.ends_with("phase_deg")
-                || error.is_none_or(|error| INTERVAL * error <= value.abs());
+            let is_significant =
+                value == 0.0 || key.ends_with("phase_deg") || half.is_none_or(|half| half <= value.abs());
+            // Without the sign of −0.
+            let value = 0.0 + if interval.is_some() { value } else { rounded(value, error) };
             let source = if is_significant {
                 source
             } else {
@@ -137,9 +144,11 @@ impl Identification {
             self.error_and_source(RefinedParameter::Inertia, self.inertia.as_ref().map(|i| i.error), || {
                 match &self.inertia {
                     Some(found) if found.is_regression() => {
-                        format!("regression of the current ({} moves)", found.accelerations)
+                        format!("regression of the current ({})", counted(found.accelerations, "move"))
                     }
-                    Some(found) => format!("Prévost eq. 5 ({} accelerations)", found.accelerations),
+                    Some(found) => {
+                        format!("Prévost eq. 5 ({})", counted(found.accelerations, "acceleration"))
+                    }
                     None => "positions".to_owned(),
                 }
             })

@@ -114,13 +114,10 @@ pub fn condition(
     let mut parts: Vec<FilteredSection> =
         pieces.into_iter().map(|section| FilteredSection::new(section, &filter)).collect();
     shift_psec(&raw.name, &mut parts, options.psec_shift, period, &mut findings);
-    if let Some(friction) =
+    if let Some(reason) =
         plausibility::check(&raw.name, &parts, (axis, options.stated), period, deviation(cutoff))?
     {
-        let what = format!(
-            "{}: the current opposes the motion (friction {:.2} A in positive direction): its sign is inverted",
-            raw.name, friction
-        );
+        let what = format!("{}: the current {reason}: its sign is inverted", raw.name);
         findings.push(Finding::note("current-inverted", what));
         parts.iter_mut().for_each(FilteredSection::invert_current);
     }
@@ -315,8 +312,10 @@ fn select_current_lag(
     }
     if lag.is_better {
         let what = format!(
-            "{name}: the current seems to lag the motion by {milliseconds:.2} ms, no more than a sampling period \
-             of {} ms; it is not compensated",
+            "{name}: the current seems to {} the motion by {:.2} ms, no more than a sampling period of {} ms; it is not \
+             compensated",
+            if milliseconds < 0.0 { "lead" } else { "lag" },
+            milliseconds.abs(),
             Rounded(period * 1e3)
         );
         findings.push(Finding::note(CODE, what));

@@ -41,14 +41,14 @@ const NEAR: f64 = 0.04;
 const BEHIND: f64 = 5e-3;
 
 /// Rejects a recording that is not plausible for an axis with its stated values. `deviation` is the standard deviation of the filter,
-/// s. Returns the friction current, A, if the sign of the current is inverted.
+/// s. Returns the reason if the sign of the current is inverted.
 pub(super) fn check(
     name: &str,
     parts: &[FilteredSection],
     axis: (&AxisConfig, StatedValues),
     period: f64,
     deviation: f64,
-) -> Result<Option<f64>, ConditioningError> {
+) -> Result<Option<String>, ConditioningError> {
     let look = PlausibilityCheck::new(name, parts, axis, deviation);
     if look.is_moving {
         look.check_velocity_correlation()?;

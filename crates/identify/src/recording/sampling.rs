@@ -7,6 +7,8 @@ use virtual_axes_core::units::{Rounded, seconds};
 
 /// Longest sampling period, s: ten samples within the shortest acceleration of 0.5 s.
 const LONGEST_PERIOD: f64 = 0.05;
+/// Sampling period, s, of slow recordings in seconds: in ms the samples of a drive are rarely that close.
+const SLOW: f64 = 0.5;
 /// Shortest sampling period relative to the current period; drives are not sampled faster.
 const SHORTEST_PERIOD: f64 = 0.25;
 /// Relative deviation from the median up to which an interval is regular.
@@ -24,7 +26,9 @@ pub(super) fn check_period(name: &str, period: f64, periods: &Periods) -> Result
         return Ok(());
     }
     let fits = |factor: f64| (shortest..=LONGEST_PERIOD).contains(&(period * factor));
-    let looks_like = if fits(1e-3) {
+    let looks_like = if period > LONGEST_PERIOD && period < SLOW {
+        "record faster, or give --column time=COLUMN[ms] if the time is in ms"
+    } else if fits(1e-3) {
         "the time is likely in ms; give --column time=COLUMN[ms]"
     } else if fits(1e-6) {
         "the time is likely in us; give --column time=COLUMN[us]"

@@ -173,7 +173,9 @@ pub(super) fn extract_sections(
         holes += split_at_holes(&dense, block.start, placed.period, &mut pieces);
     }
     if bridged > 0 {
-        let what = format!("{name}: {bridged} missing values interpolated, at most {MAX_BRIDGED} in a row");
+        let what = format!(
+            "{name}: {bridged} missing or dropped values interpolated, in gaps of at most {MAX_BRIDGED} samples"
+        );
         findings.push(Finding::note("bridged", what));
     }
     if let Some((begin, _)) = frozen.first() {
@@ -181,9 +183,9 @@ pub(super) fn extract_sections(
         let samples: usize = placed.blocks.iter().map(|block| block.rows.len()).sum();
         let lost: f64 = frozen.iter().map(|(_, length)| length / placed.period).sum();
         let what = format!(
-            "{name}: the position freezes {} times during motion, first at {begin:.3} s, for at most {:.1} ms; \
+            "{name}: the position freezes {} during motion, first at {begin:.3} s, for at most {:.1} ms; \
              these samples are dropped",
-            frozen.len(),
+            if frozen.len() == 1 { "once".to_owned() } else { format!("{} times", frozen.len()) },
             longest * 1e3
         );
         let remedy = if lost > MOSTLY_FROZEN * samples as f64 { "reduce the load on the logger" } else { "" };

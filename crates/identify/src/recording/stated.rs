@@ -16,6 +16,10 @@ pub struct StatedValues {
     pub motor_speed: bool,
     /// Jeq or mass, and the torque or force constant.
     pub inertia: bool,
+    /// Screw lead, gear ratio or direct drive.
+    pub transmission: bool,
+    /// Torque or force constant.
+    pub torque_constant: bool,
     /// Gain of the position loop.
     pub gain: bool,
     /// Delays α, β, γ.
@@ -30,6 +34,8 @@ impl StatedValues {
         current: true,
         motor_speed: true,
         inertia: true,
+        transmission: true,
+        torque_constant: true,
         gain: true,
         delays: true,
     };
@@ -40,7 +46,8 @@ impl StatedValues {
             keys.iter().any(|key| parameters.source(&format!("{axis}.{key}")).is_some_and(&is_stated))
         };
         let transmission =
-            ["transmission.screw_lead_mm", "transmission.gear_ratio", "transmission.direct"].as_slice();
+            any(&["transmission.screw_lead_mm", "transmission.gear_ratio", "transmission.direct"]);
+        let torque_constant = any(&["motor.torque_constant_nm_a", "motor.force_constant_n_a"]);
         StatedValues {
             travel: any(&[
                 "limits.travel_min_mm",
@@ -50,9 +57,10 @@ impl StatedValues {
             ]),
             velocity: any(&["limits.velocity_m_min", "limits.velocity_rpm"]),
             current: any(&["motor.max_current_a"]),
-            motor_speed: any(&["motor.max_speed_rpm", "motor.max_speed_m_min"]) && any(transmission),
-            inertia: any(&["motor.inertia_kg_m2", "motor.mass_kg"])
-                && any(&["motor.torque_constant_nm_a", "motor.force_constant_n_a"]),
+            motor_speed: any(&["motor.max_speed_rpm", "motor.max_speed_m_min"]) && transmission,
+            inertia: any(&["motor.inertia_kg_m2", "motor.mass_kg"]) && torque_constant,
+            transmission,
+            torque_constant,
             gain: any(&["position_loop.gain"]),
             delays: any(&["delays.alpha_ms", "delays.beta_ms", "delays.gamma_ms"]),
         }

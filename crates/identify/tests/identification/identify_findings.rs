@@ -153,6 +153,60 @@ fn speeds_in_one_direction_are_reported() {
 }
 
 #[test]
+fn one_direction_without_current_is_not_reported() {
+    let mut raw = recorded(&true_parameters(), &legs(&[2.0, 6.0], false), &clean());
+    raw.current = None;
+    let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
+    finding(&found, Severity::Missing, "few-moves");
+    assert!(found.findings.iter().all(|finding| finding.code != "one-direction"), "{:?}", found.findings);
+}
+
+#[test]
+fn the_sign_of_a_current_in_one_direction_is_that_of_the_acceleration() {
+    let mut raw = recorded(&true_parameters(), &legs(&[2.0, 6.0, 10.0], false), &clean());
+    raw.current.iter_mut().flatten().for_each(|current| *current = -*current);
+    let machine = initial_parameters("x").machine_config().expect("a machine");
+    let axis = &machine.axes()[axis_index(&machine, "x")];
+    let (_, findings) =
+        condition(&raw, axis, &machine.periods(), &Conditioning::default()).expect("a recording");
+    let text = &findings.iter().find(|finding| finding.code == "current-inverted").expect("a finding").what;
+    assert!(text.contains("opposes the acceleration (-") && !text.contains("friction"), "{text}");
+}
+
+#[test]
+fn one_move_is_singular() {
+    let raw = recorded(&true_parameters(), &legs(&[6.0], false), &clean());
+    let parameters = initial_parameters("x");
+    let found = identified(&[raw], &parameters, &STEPS_ONLY);
+    let values = found.values(&parameters, "x");
+    let inertia = values.iter().find(|value| value.key == "x.motor.inertia_kg_m2").expect("an inertia");
+    assert_eq!(inertia.source, "regression of the current (1 move)");
+    for value in &values {
+        let text = value.comment();
+        assert_eq!(text.starts_with("identified"), value.is_significant, "{text}");
+    }
+}
+
+#[test]
+fn torque_constant_and_lead_that_nobody_stated_are_reported() {
+    let raw = recorded(&true_parameters(), &legs(&[1.0, 2.0, 4.0, 6.0, 8.0, 10.0], true), &clean());
+    let found = identified(std::slice::from_ref(&raw), &initial_parameters("x"), &STEPS_ONLY);
+    assert!(found.findings.iter().all(|finding| finding.code != "unstated-scale"), "{:?}", found.findings);
+    let stated = StatedValues { torque_constant: false, transmission: false, ..StatedValues::ALL };
+    let options = IdentificationOptions { stated, ..STEPS_ONLY };
+    let found = identified(&[raw], &initial_parameters("x"), &options);
+    let text = finding(&found, Severity::Warning, "unstated-scale");
+    let start = initial_parameters("x");
+    let value = |key: &str| match start.get(key) {
+        Some(Value::Double(value)) => value,
+        other => panic!("{key}: {other:?}"),
+    };
+    let (constant, lead) = (value("x.motor.torque_constant_nm_a"), value("x.transmission.screw_lead_mm"));
+    let expected = format!("the torque constant of {constant} N·m/A and the screw lead of {lead} mm");
+    assert!(text.starts_with(&expected), "{text}");
+}
+
+#[test]
 fn a_saturated_current_is_excluded_and_reported() {
     let weak = |parameters| with(parameters, "x.motor.max_current_a", Value::Double(4.0));
     let raw = recorded(&weak(true_parameters()), &legs(&[1.0, 2.0, 4.0, 8.0, 12.0, 16.0], true), &clean());

@@ -1,6 +1,7 @@
 //! Findings about the sampling of recordings: phase, coarse current, and noise of the setpoints.
 
 use super::identify_findings::{STEPS_ONLY, clean, finding, identified, inertia_of, legs, recorded};
+use virtual_axes_core::config::{Value, ValueSource};
 use virtual_axes_identify::identify::{
     FeedforwardMode, Identification, IdentificationInput, IdentificationOptions, identify,
 };
@@ -52,8 +53,21 @@ fn a_current_at_a_third_of_the_position_cycle_is_reported_without_setpoints() {
     let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
     let text = finding(&found, Severity::Warning, "unseen-current");
     assert!(text.contains("sample the current every millisecond"), "{text}");
+    assert!(text.contains("a position cycle (of the initial machine, 6 ms)"), "{text}");
     let raw = RawRecording { psec: None, ..sampled(8) };
     let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
+    assert!(!has(&found, "unseen-current"), "{:?}", found.findings);
+}
+
+#[test]
+fn a_current_every_millisecond_is_not_reported_for_a_position_cycle_of_1_ms() {
+    let mut start = initial_parameters("x");
+    start
+        .set("periods.position_ms", Value::Double(1.0), &ValueSource::named("the test"))
+        .expect("a value in range");
+    let raw = RawRecording { psec: None, ..sampled(8) };
+    let found = identified(&[raw], &start, &STEPS_ONLY);
+    assert!(found.inertia.is_some());
     assert!(!has(&found, "unseen-current"), "{:?}", found.findings);
 }
 
@@ -75,7 +89,7 @@ fn setpoints_with_noise_start_at_rest() {
 fn a_current_at_multiples_of_the_position_cycle_is_reported() {
     let found = identified(&[sampled(192)], &initial_parameters("x"), &STEPS_ONLY);
     let text = finding(&found, Severity::Warning, "unseen-current");
-    assert!(text.contains("sampled every 4 position cycles of 6 ms"), "{text}");
+    assert!(text.contains("sampled every 4 position cycles of 6 ms, at one phase"), "{text}");
     let found = identified(&[sampled(160)], &initial_parameters("x"), &STEPS_ONLY);
     assert!(!has(&found, "unseen-current"), "{:?}", found.findings);
 }

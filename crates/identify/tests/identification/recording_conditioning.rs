@@ -722,6 +722,16 @@ proptest! {
 }
 
 #[test]
+fn a_slow_recording_in_seconds_is_not_taken_for_milliseconds() {
+    for (period, expected) in [(0.2, "record faster, or give"), (6.0, "the time is likely in ms")] {
+        let mut raw = recording();
+        raw.time = (0..raw.time.len()).map(|row| row as f64 * period).collect();
+        let text = fault(&raw).to_string();
+        assert!(text.contains(expected), "{text}");
+    }
+}
+
+#[test]
 fn an_inverted_current_is_turned() {
     let mut raw = recording();
     let reference = run(&raw).0;

@@ -12,6 +12,7 @@ use virtual_axes_identify::identify::{
 };
 use virtual_axes_identify::recording::Severity;
 
+use super::page::counted;
 use crate::text::{NONE, digits};
 use crate::{DisplayUnit, Table};
 
@@ -34,11 +35,11 @@ pub fn verdict(found: &IdentificationSummary) -> String {
     );
     let invalid = if count(Severity::Invalid) > 0 { "; invalid" } else { "" };
     format!(
-        "{}: {} parameters identified, {residual}, {} missing, {} warnings{invalid}",
+        "{}: {} identified, {residual}, {} missing, {}{invalid}",
         found.axis,
-        found.values.iter().filter(|value| value.is_significant).count(),
+        counted(found.values.iter().filter(|value| value.is_significant).count(), "parameter"),
         count(Severity::Missing),
-        count(Severity::Warning)
+        counted(count(Severity::Warning), "warning")
     )
 }
 
@@ -286,10 +287,14 @@ pub fn inertia(inertia: &InertiaSummary) -> String {
     let [value, error] = [digits(inertia.eq5, 5), digits(inertia.error, 2)];
     let count = inertia.accelerations;
     if inertia.spread.is_nan() {
-        return format!("inertia: {value} ± {error} by regression of the current over {count} moves");
+        return format!(
+            "inertia: {value} ± {error} by regression of the current over {}",
+            counted(count, "move")
+        );
     }
     let mut text = format!(
-        "inertia: {value} ± {error} by Prévost eq. 5 from {count} accelerations (standard deviation of single samples {})",
+        "inertia: {value} ± {error} by Prévost eq. 5 from {} (standard deviation of single samples {})",
+        counted(count, "acceleration"),
         digits(inertia.spread, 2)
     );
     if let Some(simulated) = inertia.simulated_eq5 {

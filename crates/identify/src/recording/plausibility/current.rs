@@ -70,8 +70,9 @@ impl PlausibilityCheck<'_> {
         Ok(())
     }
 
-    /// Returns the friction current, A, if its sign and that of the inertia part are wrong; gravity does not matter.
-    pub(super) fn inverted_current(&self, parts: &[FilteredSection]) -> Option<f64> {
+    /// Returns the reason why the sign of the current is inverted, if the signs of the friction and of the inertia part are
+    /// wrong; gravity does not matter.
+    pub(super) fn inverted_current(&self, parts: &[FilteredSection]) -> Option<String> {
         self.smooth_current.as_ref()?;
         let mut moving = MovingSamples::new(parts, self.axis.kind, 0, 0);
         if moving.indices.len() < FEWEST_MOVING {
@@ -102,6 +103,12 @@ impl PlausibilityCheck<'_> {
         let is_inertial = whole.r2 - without(&[0]) > INERTIAL;
         let inertia_sign = if is_inertial { whole.coefficients[0].signum() } else { 0.0 };
         let turned = friction_sign + inertia_sign < 0.0;
-        (turned && whole.r2 > EXPLAINED).then_some(friction)
+        (turned && whole.r2 > EXPLAINED).then(|| match friction_sign < 0.0 {
+            true => format!("opposes the motion (friction {friction:.2} A in positive direction)"),
+            false => {
+                let (slope, unit) = (Rounded(whole.coefficients[0]), self.unit());
+                format!("opposes the acceleration ({slope} A per {unit}/s²)")
+            }
+        })
     }
 }

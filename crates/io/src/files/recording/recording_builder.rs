@@ -7,6 +7,7 @@ use super::found_column::{ColumnUnit, FoundColumn};
 use super::unit::Channel;
 use crate::files::error::FileError;
 use virtual_axes_core::text::shortened;
+use virtual_axes_core::units::{MILLISECOND, Rounded};
 use virtual_axes_identify::recording::{Finding, RawRecording};
 
 /// Values of all channels, in the order of [`Channel::ALL`]; NaN where a value is missing.
@@ -106,6 +107,19 @@ fn set_time(
     let is_counter = column.and_then(|c| c.unit.as_ref()).is_some_and(ColumnUnit::is_samples);
     if is_counter && context.columns.mapping(Channel::Time).is_none() {
         let first = recording.time.first().copied().unwrap_or_default();
+        let steps = recording.time.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0);
+        let step = steps.fold(f64::INFINITY, f64::min);
+        if step.is_finite() && step > 1.0 {
+            let header = column.map_or_else(String::new, |column| shortened(&column.header));
+            let what = format!(
+                "{}: column {header} counts {} per row: with the {} Hz of --rate-hz, which are those of the counter, a row lasts {} ms",
+                context.name,
+                Rounded(step),
+                Rounded(rate),
+                Rounded(step / rate / MILLISECOND)
+            );
+            findings.push(Finding::note("counter-step", what));
+        }
         recording.time.iter_mut().for_each(|time| *time = (*time - first) / rate);
         return;
     }
