@@ -36,7 +36,7 @@ pub fn write_fmu(arguments: &FmuArguments) -> Result<String, Box<dyn Error>> {
     for path in &found {
         must_not_replace(&arguments.out, path)?;
     }
-    let archive = fmu_archive(&text, &found)?;
+    let archive = fmu_archive(&text, &found).map_err(|error| -> Box<dyn Error> { error })?;
     let mut file = OutputFile::create(&arguments.out)?;
     file.write_all(&archive)?;
     file.finish()?;
