@@ -51,6 +51,8 @@ pub struct AxisFigures {
     pub max_current: f64,
     /// Errors, current, saturation.
     pub report: AxisReport,
+    /// Figures of the position cycles at feed; `None` without rapid traverse, or without anything else.
+    pub cuts: Option<AxisReport>,
     /// Time outside its travel limits at position cycles, over the whole run, s.
     pub outside_travel_limits_time: f64,
     /// True if the friction law was used beyond the velocities that it was fitted for.

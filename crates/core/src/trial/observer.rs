@@ -66,6 +66,8 @@ pub(super) struct Observer<'a> {
     tick: f64,
     end: f64,
     axes: Vec<AxisAssessor>,
+    /// Figures of the position cycles at feed.
+    cuts: Vec<AxisAssessor>,
     moves: Vec<bool>,
     extrapolated: Vec<bool>,
     /// Number of position cycles outside the travel limits, per axis.
@@ -115,6 +117,7 @@ impl<'a> Observer<'a> {
             tick: seconds(machine.periods().current),
             end: 0.0,
             axes: vec![AxisAssessor::default(); count],
+            cuts: vec![AxisAssessor::default(); count],
             moves: vec![false; count],
             extrapolated: vec![false; count],
             outside_travel: vec![0; count],
@@ -192,6 +195,12 @@ impl<'a> Observer<'a> {
             self.kinematics.forward(&(0..self.axes.len()).map(delayed).collect::<Vec<_>>())
         });
         let first = self.follow(cycle, turned.as_ref());
+        if cycle.is_moving && !self.is_rapid() {
+            for (index, cuts) in self.cuts.iter_mut().enumerate() {
+                let (machine, at) = axis(index);
+                cuts.observe(machine.axis(at).sample(), &machine.activity(at));
+            }
+        }
         if let Some(recorder) = &mut self.recorder {
             let axes = (0..self.axes.len()).map(|index| {
                 let (machine, at) = axis(index);
@@ -258,6 +267,11 @@ impl<'a> Observer<'a> {
         Some(first)
     }
 
+    /// Returns true if the first tick of the last position cycle is at rapid traverse.
+    fn is_rapid(&self) -> bool {
+        matches!(&self.tracker, Some(Tracker::Setpoints(tracker)) if tracker.rapid().next().unwrap_or(false))
+    }
+
     fn observe_circles(&mut self, cycle: &PositionCycle) {
         let workpiece = self.trial.program.as_ref().is_some_and(|p| p.path().frame() == Frame::Workpiece);
         let (kinematics, poses, ticks) = (&self.kinematics, &self.poses, cycle.ticks());
@@ -272,12 +286,14 @@ impl<'a> Observer<'a> {
     /// Returns the figures so far, without a recording.
     pub(super) fn figures(&self) -> Figures {
         let machine = self.trial.machine;
+        let has_both = self.has_cuts && self.rapids.count > 0;
         let axes = machine.axes().iter().enumerate().map(|(index, axis)| AxisFigures {
             name: axis.name().to_owned(),
             kind: axis.kind(),
             moves: self.moves[index],
             max_current: axis.motor.max_current,
             report: self.axes[index].report(self.tick),
+            cuts: has_both.then(|| self.cuts[index].report(self.tick)),
             outside_travel_limits_time: self.outside_travel[index] as f64
                 * seconds(machine.periods().position),
             friction_extrapolated: self.extrapolated[index],

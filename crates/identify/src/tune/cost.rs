@@ -14,9 +14,9 @@ pub enum CostTerm {
     Contour,
     /// RMS contour error of the motions at feed, µm; without contour error the same as [`CostTerm::FollowingRms`].
     ContourRms,
-    /// Largest delay-compensated following error of any axis, µm or mdeg.
+    /// Largest delay-compensated following error of any axis, µm or mdeg: of the motions at feed, where there are any.
     Following,
-    /// Largest RMS delay-compensated following error of any axis, µm or mdeg.
+    /// Largest RMS delay-compensated following error of any axis, µm or mdeg: of the motions at feed, where there are any.
     FollowingRms,
     /// Largest current of any axis relative to its limit.
     Current,
@@ -68,14 +68,15 @@ impl CostTerm {
             figures.axes.iter().filter(|axis| axis.moves).map(value).fold(0.0, f64::max)
         };
         let unit = |axis: &AxisFigures| AxisUnits::for_kind(axis.kind).error;
+        let at_feed = |axis: &AxisFigures| axis.cuts.unwrap_or(axis.report);
         match (self, figures.contour.filter(|_| has_contour(figures))) {
             (CostTerm::Contour, Some(contour)) => contour.max / MICROMETER,
             (CostTerm::ContourRms, Some(contour)) => contour.rms / MICROMETER,
             (CostTerm::Contour | CostTerm::Following, _) => {
-                worst(&|axis| axis.report.max_delay_compensated_following_error / unit(axis))
+                worst(&|axis| at_feed(axis).max_delay_compensated_following_error / unit(axis))
             }
             (CostTerm::ContourRms | CostTerm::FollowingRms, _) => {
-                worst(&|axis| axis.report.rms_delay_compensated_following_error / unit(axis))
+                worst(&|axis| at_feed(axis).rms_delay_compensated_following_error / unit(axis))
             }
             (CostTerm::Activity, _) => worst(&|axis| axis.report.control_activity),
             (CostTerm::Current, _) => {

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use virtual_axes_core::units::{MILLIMETER, Rounded};
 
+use super::dialect::Dialect;
 use super::error::Outcome;
 use super::limits::{MAX_LENGTH, MAX_TURNS};
 use super::line_words::LineWords;
@@ -50,7 +51,15 @@ impl State {
     fn center_by_words(&self, block: &mut LineWords, start: &Coordinates) -> Outcome<[f64; 2]> {
         let [first, second, normal] = self.modal.plane.axes();
         let letters = [CENTERS[first], CENTERS[second]];
-        if block.get(CENTERS[normal]).is_some() {
+        // grbl does not read the third word; posts write it as 0.
+        let is_unused = |word: f64| match self.dialect {
+            Dialect::Grbl => true,
+            Dialect::LinuxCnc => false,
+            _ => word == 0.0,
+        };
+        if block.get(CENTERS[normal]).is_some_and(is_unused) {
+            block.take(CENTERS[normal]);
+        } else if block.get(CENTERS[normal]).is_some() {
             return Err(format!(
                 "word {} is not in the plane of the arc, which has {} and {}",
                 CENTERS[normal], letters[0], letters[1]

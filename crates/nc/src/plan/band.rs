@@ -17,20 +17,18 @@ impl BandSystem {
         self.right.resize(size, 0.0);
     }
 
-    /// Adds `weight · g gᵀ` to the matrix and `value · g` to the right-hand side, for a gradient g with three entries from
-    /// unknown `first` on.
-    pub fn add(&mut self, first: usize, gradient: &[f64; 3], weight: f64, value: f64) {
-        for a in 0..3 {
-            let g = gradient[a];
-            if g == 0.0 {
-                continue;
-            }
-            let row = &mut self.rows[first + a];
-            for b in a..3 {
-                row[b - a] += weight * g * gradient[b];
-            }
-            self.right[first + a] += value * g;
+    /// Adds a symmetric block of three unknowns from `first` on, by its entries (0, 0), (0, 1), (0, 2), (1, 1), (1, 2) and
+    /// (2, 2), and their right-hand side.
+    pub fn add(&mut self, first: usize, [a, b, c, d, e, f]: &[f64; 6], right: &[f64; 3]) {
+        for (row, block) in self.rows[first..].iter_mut().zip([[*a, *b, *c], [*d, *e, 0.0], [*f, 0.0, 0.0]]) {
+            add(row, &block);
         }
+        add(&mut self.right[first..], right);
+    }
+
+    /// Adds `factor · right` to the right-hand side.
+    pub fn add_right(&mut self, factor: f64, right: &[f64]) {
+        self.right.iter_mut().zip(right).for_each(|(sum, value)| *sum += factor * value);
     }
 
     /// Fixes unknown `index` at 0.
@@ -78,4 +76,9 @@ impl BandSystem {
         }
         Some(&self.right)
     }
+}
+
+/// Adds `terms` to the first of `sums`.
+pub(super) fn add(sums: &mut [f64], terms: &[f64]) {
+    sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
 }

@@ -2,7 +2,7 @@
 
 use virtual_axes_core::config::LimitsConfig;
 
-use super::vector::JointVector;
+use super::vector::{JointVector, MAX_JOINTS};
 
 /// First three derivatives of the joints at one end of an interval.
 pub(super) type Node = [JointVector; 3];
@@ -31,21 +31,6 @@ pub(super) enum WindowStart {
 
 /// Solution over the intervals between the rest intervals: b and b′ at each station.
 pub(super) type Stations = Vec<(f64, f64)>;
-
-/// Constraint |g| ≤ 1 on three consecutive coefficients.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct ConstraintRow {
-    pub first: usize,
-    pub gradient: [f64; 3],
-    pub value: f64,
-}
-
-impl ConstraintRow {
-    /// Returns the excess over both sides of the constraint: g − 1 and −g − 1.
-    pub fn excess(&self) -> [f64; 2] {
-        [self.value - 1.0, -self.value - 1.0]
-    }
-}
 
 /// Linear form in three consecutive coefficients.
 pub(super) type Form = [f64; 3];
@@ -143,58 +128,50 @@ impl Window<'_> {
         }
         (1.5 * acceleration * h).min((4.5 * jerk).powf(2.0 / 3.0) * h.powf(4.0 / 3.0))
     }
-}
 
-/// Adds `form · c ≤ bound` for a positive form.
-pub(super) fn push_upper(rows: &mut Vec<ConstraintRow>, first: usize, form: &Form, c: &[f64], bound: f64) {
-    if bound.is_finite() {
-        rows.push(ConstraintRow { first, gradient: scaled(form, 1.0 / bound), value: dot(form, c) / bound });
+    /// Calls `push` with each form g of the linear constraints |g| ≤ 1 of inner interval `k`: speed, and acceleration of
+    /// the joints.
+    pub fn linear_forms(&self, k: usize, shape: &IntervalForms, mut push: impl FnMut(Form)) {
+        let (inner, interval) = (self.inner(), &self.inner()[k]);
+        let mut upper = |form: &Form, bound: f64| {
+            if bound.is_finite() {
+                push(scaled(form, 1.0 / bound));
+            }
+        };
+        let bound = interval.cap * interval.cap;
+        for at in [0, 2, 1] {
+            upper(&shape.b[at], bound);
+        }
+        if k == 0 && self.start == WindowStart::Rest {
+            upper(&shape.b[0], self.rest_bound(0));
+        }
+        if k + 1 == inner.len() {
+            upper(&shape.b[1], self.rest_bound(1));
+        }
+        for (bounds, [q1, q2, q3]) in self.joints.iter().zip(derivatives(interval, 0)) {
+            if q1 != 0.0 || q2 != 0.0 || q3 != 0.0 {
+                let scale = 1.0 / (interval.share * bounds.acceleration);
+                push(sum(&scaled(&shape.slope[0], 0.5 * q1 * scale), &scaled(&shape.b[0], q2 * scale)));
+            }
+        }
+    }
+
+    /// Calls `push` with each form g of the constraints |√b g| ≤ 1 on the jerk of the joints at the start (0), the end (1) or
+    /// in the middle (2) of inner interval `k`.
+    pub fn jerk_forms(&self, k: usize, shape: &IntervalForms, end: usize, mut push: impl FnMut(Form)) {
+        let interval = &self.inner()[k];
+        for (bounds, [q1, q2, q3]) in self.joints.iter().zip(derivatives(interval, end)) {
+            if q1 != 0.0 || q2 != 0.0 || q3 != 0.0 {
+                let curved = sum(&scaled(&shape.slope[end], 1.5 * q2), &scaled(&shape.curvature, 0.5 * q1));
+                let form = sum(&scaled(&shape.b[end], q3), &curved);
+                push(scaled(&form, 1.0 / (interval.share * bounds.jerk)));
+            }
+        }
     }
 }
 
-/// Adds the bounds on the speed.
-pub(super) fn push_bounds(
-    rows: &mut Vec<ConstraintRow>,
-    k: usize,
-    interval: &Interval,
-    shape: &IntervalForms,
-    c: &[f64],
-) {
-    let bound = interval.cap * interval.cap;
-    push_upper(rows, k, &shape.b[0], c, bound);
-    push_upper(rows, k, &[0.0, 1.0, 0.0], c, bound);
-    push_upper(rows, k, &shape.b[1], c, bound);
-}
-
-/// Adds the bounds of the joints' acceleration and jerk at the start (0), the end (1) or in the middle (2) of an interval.
-pub(super) fn push_joint_rows(
-    rows: &mut Vec<ConstraintRow>,
-    k: usize,
-    interval: &Interval,
-    shape: &IntervalForms,
-    c: &[f64],
-    end: usize,
-    joints: &[LimitsConfig],
-) {
-    let (b, slope) = (&shape.b[end], &shape.slope[end]);
-    let speed = dot(b, c).max(f64::MIN_POSITIVE).sqrt();
+/// Returns the first three derivatives of each joint at the start (0), the end (1) or in the middle (2) of an interval.
+fn derivatives(interval: &Interval, end: usize) -> impl Iterator<Item = [f64; 3]> {
     let [from, to] = if end == 2 { [0, 1] } else { [end; 2] }.map(|end| &interval.ends[end]);
-    for (j, bounds) in joints.iter().enumerate() {
-        let value = |order: usize| 0.5 * (from[order][j] + to[order][j]);
-        let (q1, q2, q3) = (value(0), value(1), value(2));
-        if q1 == 0.0 && q2 == 0.0 && q3 == 0.0 {
-            continue;
-        }
-        let mut push = |gradient: Form, value: f64| rows.push(ConstraintRow { first: k, gradient, value });
-        if end == 0 {
-            let scale = 1.0 / (interval.share * bounds.acceleration);
-            let form = sum(&scaled(slope, 0.5 * q1 * scale), &scaled(b, q2 * scale));
-            push(form, dot(&form, c));
-        }
-        let scale = 1.0 / (interval.share * bounds.jerk);
-        let form = sum(&scaled(b, q3), &sum(&scaled(slope, 1.5 * q2), &scaled(&shape.curvature, 0.5 * q1)));
-        let value = dot(&form, c);
-        let gradient = sum(&scaled(&form, speed * scale), &scaled(b, 0.5 * value / speed * scale));
-        push(gradient, value * speed * scale);
-    }
+    (0..MAX_JOINTS).map(move |j| [0, 1, 2].map(|order| 0.5 * (from[order][j] + to[order][j])))
 }
