@@ -453,4 +453,24 @@ fn the_cost_of_a_tuning_is_the_error_of_the_cuts() {
     let rapids = contour(problem.present()).rapids.expect("rapid traverse");
     assert!(contour(at_feed.present()).rapids.is_none());
     assert_eq!(at_feed.present().cost, rapids.max / MICROMETER);
+    // Following errors likewise: the largest of all motions is at rapid traverse.
+    for name in ["following", "rms"] {
+        let cost: Cost = name.parse().expect("a term");
+        let of = |workload: &Workload| {
+            let problem = TuningProblem::new(&parameters, workload, &cost, &NoProgress).expect("a problem");
+            let axes = problem.present().figures.axes.clone();
+            (problem.present().cost, axes)
+        };
+        let ((cuts, axes), (whole, _)) = (of(&cuts), of(&all));
+        let [at_feed, of_all] = [true, false].map(|is_cut| {
+            let reports = axes.iter().map(|axis| if is_cut { axis.cuts.expect("cuts") } else { axis.report });
+            let errors = reports.map(|report| match name {
+                "rms" => report.rms_delay_compensated_following_error,
+                _ => report.max_delay_compensated_following_error,
+            });
+            errors.fold(0.0, f64::max) / MICROMETER
+        });
+        assert_eq!((cuts, whole), (at_feed, of_all), "{name}");
+        assert!(cuts < 0.8 * whole, "{name}: {cuts} of {whole}");
+    }
 }

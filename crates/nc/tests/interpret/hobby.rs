@@ -1,6 +1,7 @@
 //! Programs in the manner of grbl and Mach3, comments and other texts of each control, and their detection.
 
 use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions};
+use virtual_axes_nc::motion::{MotionKind, ProgramStep};
 
 use crate::common::{millimeters, motions};
 
@@ -98,4 +99,32 @@ fn all_errors_of_a_program_are_reported_once_with_count_and_line() {
         ),
     ];
     assert_eq!(found, expected);
+}
+
+/// Posts write all three words of an arc center: a quarter circle of 10 mm from (10, 0) to (0, 10).
+#[test]
+fn the_center_word_across_the_plane_is_unused() {
+    let arc = "G21 G90 G17\nG0 X10 Y0\nG3 X0 Y10 I-10 J0 K0.000 F100\nM30\n";
+    let run = |text: &str, dialect: Dialect| {
+        let options = InterpreterOptions { dialect: Some(dialect), ..InterpreterOptions::default() };
+        let steps = Interpreter::new(std::io::Cursor::new(text.to_owned()), "part.nc", options);
+        steps.collect::<Result<Vec<_>, _>>().map_err(|error| error.to_string())
+    };
+    for dialect in [Dialect::Grbl, Dialect::Mach3, Dialect::Fanuc, Dialect::Haas] {
+        let steps = run(arc, dialect).expect("an arc");
+        let arcs = steps.iter().filter_map(|step| match step {
+            ProgramStep::Motion(motion) => match &motion.kind {
+                MotionKind::Arc(arc) => Some((arc.center, arc.sweep, millimeters(&motion.end))),
+                _ => None,
+            },
+            ProgramStep::Event { .. } => None,
+        });
+        let [(center, sweep, end)] = arcs.collect::<Vec<_>>()[..] else { panic!("one arc") };
+        assert!(center[0].hypot(center[1]) < 1e-15, "{dialect:?}: {center:?}");
+        assert!((sweep - std::f64::consts::FRAC_PI_2).abs() < 1e-12, "{dialect:?}: {sweep}");
+        assert_eq!(end, [0.0, 10.0, 0.0]);
+    }
+    // rs274 rejects it, and so does the control that would move along the normal.
+    assert!(run(arc, Dialect::LinuxCnc).expect_err("rejected").contains("word K"));
+    assert!(run(&arc.replace("K0.000", "K2"), Dialect::Fanuc).expect_err("rejected").contains("word K"));
 }
