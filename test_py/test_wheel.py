@@ -377,3 +377,26 @@ def test_the_wheel_is_small_and_runs_in_an_empty_environment(tmp_path: Path) -> 
     environment = {"PATH": "/usr/bin:/bin"}
     done = subprocess.run([python, "-c", program], capture_output=True, text=True, timeout=60, env=environment)
     assert done.returncode == 0 and done.stdout.startswith("cascade: 68.6 µm"), done.stdout + done.stderr
+
+
+def test_lifting_without_friction_is_work_against_the_weight(machine: va.Machine) -> None:
+    """W h; input, copper loss, work and magnetic energy are balanced."""
+    coefficients = ("a", "b", "c", "d", "i0")
+    frictionless = machine.with_({f"z.friction.{name}": 0.0 for name in coefficients})
+    share = np.clip((np.arange(800) - 20) / 300, 0, 1)
+    psec = np.zeros((800, 5))
+    psec[:, 2] = 0.1 * (share - np.sin(2 * np.pi * share) / (2 * np.pi))
+    figures = frictionless.simulate(psec).figures
+    energy = figures["axes"]["z"]["energy"]
+    weight = machine.parameters["z.gravity.weight_n"]
+    assert energy["mechanical_work_j"] == pytest.approx(0.1 * weight, rel=1e-9)
+    parts = energy["copper_loss_j"] + energy["mechanical_work_j"] + energy["magnetic_j"]
+    assert energy["input_j"] == pytest.approx(parts, rel=1e-9)
+    # At rest the motor holds the weight: (Kt/Ke) R (r W/Kt)².
+    kt, ke, resistance = (
+        machine.parameters[f"z.motor.{name}"]
+        for name in ("torque_constant_nm_a", "emf_constant_v_s_rad", "resistance_ohm")
+    )
+    lead = machine.parameters["z.transmission.screw_lead_mm"] * 1e-3
+    current = weight * lead / (2 * np.pi) / kt
+    assert energy["holding_power_w"] == pytest.approx(kt / ke * resistance * current**2, rel=1e-3)
