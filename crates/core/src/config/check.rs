@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::control::check_profile;
+use super::control::{ControlProfile, PROFILE};
 use super::control_check::check_control;
 use super::coupling_check::check_couplings;
 use super::cross_check::CrossChecks;
@@ -18,6 +18,9 @@ use crate::units::{MILLISECOND_NS, Rounded, SECOND_NS};
 
 /// Relative tolerance of `publish_rate` above the rate of position cycles: 166.7 Hz is accepted for 6 ms.
 const RATE_TOLERANCE: f64 = 1e-2;
+
+/// Beginning of the keys that belong to the profile of the control.
+const CONTROL: &str = "control.";
 
 /// Keys that determine the other keys of a joint.
 const TYPE: &str = "type";
@@ -189,4 +192,17 @@ fn check_clock(set: &CrossChecks<'_>) -> Result<(), ConfigError> {
         ));
     }
     Ok(())
+}
+
+/// Rejects parameters that have no effect with the profile.
+fn check_profile(set: &CrossChecks<'_>) -> Result<(), ConfigError> {
+    let mut keys = set.entries.keys().filter(|key| key.starts_with(CONTROL) && *key != PROFILE);
+    match keys.next() {
+        Some(key) if set.is_chosen(PROFILE, ControlProfile::Own.name()) => {
+            let allowed =
+                format!("not be given with {PROFILE} own: set {PROFILE} to linuxcnc, or remove {key}");
+            Err(set.rejection(&[key, PROFILE], allowed))
+        }
+        _ => Ok(()),
+    }
 }

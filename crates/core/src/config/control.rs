@@ -1,15 +1,12 @@
 //! Trajectory planner of the control: how a part program becomes setpoints.
 
-use super::cross_check::CrossChecks;
 use super::declaration::{choice_of, parameters};
 use super::definition::DefaultValue::{Integer, Number, Text};
 use super::definition::{ParameterDefinition, choice, integer, number};
-use super::error::ConfigError;
 use crate::units::{METER_PER_MINUTE, MILLIMETER, MILLISECOND};
 
-/// Key of the profile, and the beginning of the keys that belong to it.
-const PROFILE: &str = "control.profile";
-const KEYS: &str = "control.";
+/// Key of the profile.
+pub(super) const PROFILE: &str = "control.profile";
 
 crate::named_values! {
     /// Name of a profile of the control.
@@ -82,18 +79,5 @@ impl Default for ControlConfig {
             gap_cycles: 4.0,
             wait: 25.0 * MILLISECOND,
         }
-    }
-}
-
-/// Rejects parameters that have no effect with the profile.
-pub(super) fn check_profile(set: &CrossChecks<'_>) -> Result<(), ConfigError> {
-    let mut keys = set.entries.keys().filter(|key| key.starts_with(KEYS) && *key != PROFILE);
-    match keys.next() {
-        Some(key) if set.is_chosen(PROFILE, ControlProfile::Own.name()) => {
-            let allowed =
-                format!("not be given with {PROFILE} own: set {PROFILE} to linuxcnc, or remove {key}");
-            Err(set.rejection(&[key, PROFILE], allowed))
-        }
-        _ => Ok(()),
     }
 }

@@ -1,10 +1,6 @@
-//! Curves between two motions: arcs in a corner, and motions that overlap in time.
+//! Curves in a corner: arcs, and cubic polynomials like them.
 
-use std::sync::Arc;
-
-use super::interval_motion::PathState;
-use super::piece::Piece;
-use super::vector::{Jet, JointVector, MAX_JOINTS, difference};
+use super::vector::{Jet, JointVector, difference};
 
 /// Circular arc that touches both lines of a corner.
 #[derive(Debug, Clone)]
@@ -49,54 +45,6 @@ impl CornerArc {
     }
 }
 
-/// Motion with constant acceleration along a curve.
-#[derive(Debug, Clone)]
-pub(super) struct TimedCurve {
-    pub piece: Arc<Piece>,
-    /// State at the start.
-    pub state: PathState,
-}
-
-impl TimedCurve {
-    /// Returns the coordinates and their derivatives with respect to time.
-    fn jet(&self, time: f64) -> Jet {
-        let PathState { u, rate, acceleration: a } = self.state;
-        let place = (u + time * (rate + 0.5 * time * a)).clamp(0.0, self.piece.length);
-        let [q, q1, q2, q3] = self.piece.jet(place);
-        let v = rate + time * a;
-        let each = |of: &dyn Fn(usize) -> f64| -> JointVector { std::array::from_fn(of) };
-        [
-            q,
-            each(&|i| q1[i] * v),
-            each(&|i| q1[i] * a + q2[i] * v * v),
-            each(&|i| 3.0 * q2[i] * v * a + q3[i] * v.powi(3)),
-        ]
-    }
-}
-
-/// End of one motion and start of the next at the same time: the sum of both from their common point.
-#[derive(Debug, Clone)]
-pub(super) struct Overlap {
-    pub motions: [TimedCurve; 2],
-    /// Time per unit of the path parameter.
-    pub pace: f64,
-}
-
-impl Overlap {
-    /// Returns the coordinates and their derivatives at path parameter `u`.
-    pub fn jet(&self, u: f64) -> Jet {
-        let [ending, starting] = self.motions.each_ref().map(|motion| motion.jet(u * self.pace));
-        let corner = self.motions[1].piece.point(0.0);
-        let mut jet = [[0.0; MAX_JOINTS]; 4];
-        jet[0] = std::array::from_fn(|i| ending[0][i] + (starting[0][i] - corner[i]));
-        for order in 1..jet.len() {
-            let scale = self.pace.powi(order as i32);
-            jet[order] = std::array::from_fn(|i| scale * (ending[order][i] + starting[order][i]));
-        }
-        jet
-    }
-}
-
 /// Returns the cubic polynomial over `length` between two points with unit tangents, like an arc of `radius` and `angle`.
 pub(super) fn cubic_corner(
     points: &[JointVector; 2],
@@ -121,6 +69,7 @@ pub(super) fn cubic_corner(
 
 #[cfg(test)]
 mod tests {
+    use super::super::vector::MAX_JOINTS;
     use super::*;
 
     #[test]

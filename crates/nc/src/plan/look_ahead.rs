@@ -3,12 +3,13 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::activity::{ProgramActivity, ProgramStop};
+use super::activity::ProgramStop;
 use super::error::FeedPlanError;
 use super::interval_motion::{IntervalMotion, Law, motions, straight_line};
 use super::machine_model::{MachineModel, Surroundings};
 use super::piece::{Piece, PieceCurve};
 use super::pieces::PieceSource;
+use super::planned_interval::PlannedInterval;
 use super::source::Part;
 use super::speed::SpeedSolver;
 use super::trapezoid::TrapezoidPlanner;
@@ -38,35 +39,6 @@ const RETRY: f64 = 0.8;
 /// Part of the planned time after which a window with the largest number of intervals is planned again: the work stays in
 /// proportion to the path.
 const FULL_RETRY: f64 = 0.5;
-
-/// Interval of the path with its planned motion.
-#[derive(Debug, Clone)]
-pub(super) struct PlannedInterval {
-    /// Interval for the speed solver; `None` for a motion of closed form.
-    interval: Option<Interval>,
-    pub piece: Option<Arc<Piece>>,
-    /// Start of the interval from the start of the piece.
-    pub from: f64,
-    pub motion: Option<IntervalMotion>,
-    /// Activity of a standstill.
-    pub standstill: Option<ProgramActivity>,
-    /// True if the motion stops at the end of the interval.
-    is_stop: bool,
-}
-
-impl PlannedInterval {
-    /// Creates an interval with a motion of closed form.
-    pub fn closed_form(piece: Arc<Piece>, from: f64, motion: IntervalMotion) -> Self {
-        let (piece, motion) = (Some(piece), Some(motion));
-        Self { interval: None, piece, from, motion, standstill: None, is_stop: true }
-    }
-
-    /// Creates a standstill at the end of a piece.
-    pub fn standstill(piece: Option<Arc<Piece>>, motion: IntervalMotion, activity: ProgramActivity) -> Self {
-        let from = piece.as_ref().map_or(0.0, |piece| piece.length);
-        Self { interval: None, piece, from, motion: Some(motion), standstill: Some(activity), is_stop: true }
-    }
-}
 
 /// Look-ahead window over the pieces of a program.
 pub(super) struct LookAhead<'a> {

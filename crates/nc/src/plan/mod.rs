@@ -28,6 +28,7 @@ mod nurbs;
 mod piece;
 mod pieces;
 mod planned;
+mod planned_interval;
 mod planner;
 mod programmed;
 mod source;

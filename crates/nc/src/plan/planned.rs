@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use virtual_axes_core::trajectory::feed_override::PlannedMotion;
 
-use super::look_ahead::PlannedInterval;
 use super::machine_model::MachineModel;
+use super::planned_interval::PlannedInterval;
 use super::vector::{JointVector, MAX_JOINTS};
 
 /// Returns a point without coordinates.

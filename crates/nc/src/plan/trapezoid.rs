@@ -16,14 +16,14 @@ use std::sync::Arc;
 use virtual_axes_core::config::ControlConfig;
 
 use super::activity::ProgramStop;
-use super::corner::{CornerArc, Overlap, TimedCurve, cubic_corner};
+use super::corner::{CornerArc, cubic_corner};
 use super::error::FeedPlanError;
 use super::interval_motion::{IntervalMotion, Law, PathState};
-use super::look_ahead::PlannedInterval;
 use super::machine_model::MachineModel;
 use super::motion_curve::{CurveEnd, FeedCap, MotionCurve, Shape};
-use super::piece::{Piece, PieceCurve};
+use super::piece::{Overlap, Piece, PieceCurve, TimedCurve};
 use super::pieces::PieceSource;
+use super::planned_interval::PlannedInterval;
 use super::source::Part;
 use super::vector::{JointVector, MAX_JOINTS, norm};
 
