@@ -3,7 +3,7 @@
 use serde_json::Value;
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
-use crate::command_common::{assert_rejected, json, printed};
+use crate::command_common::{assert_rejected, json, printed, run};
 
 /// Square with a rest before the first cut.
 const SQUARE: &str = "G21 G90 G17 G94 G64 P0.01
@@ -104,8 +104,10 @@ M2
     for kept in ["G38.2 X-.1 F20.", "G0 X1. Z1.", "G0 X-1. Z0."] {
         assert!(better.lines().any(|line| line == kept), "{kept}\n{better}");
     }
-    let run = json(&["run", &out, "--reference", &part, "--json"]);
-    assert_eq!(max(&run), figure(&report, "after", "nominal"));
+    // Notes on inches and probing are on standard error.
+    let output = run(&["run", &out, "--reference", &part, "--json"]);
+    let found: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert_eq!(max(&found), figure(&report, "after", "nominal"));
 }
 
 #[test]

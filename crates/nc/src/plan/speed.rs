@@ -84,13 +84,14 @@ impl Block {
     /// Sets `most` to the largest parts of the slacks and of the multipliers that a whole step takes away.
     #[inline(always)]
     fn bound(&self, steps: &Form, barrier: f64, most: &mut [Lanes; 2]) {
-        for i in 0..LANES {
+        let [slacks, multipliers] = most;
+        for (i, (most_of_slack, most_of_multiplier)) in slacks.iter_mut().zip(multipliers).enumerate() {
             let along = self.along(i, steps);
             let (upper, lower) = (self.side(i, 0, along, barrier), self.side(i, 1, -along, barrier));
             let slack = larger(-upper[0] / self.slacks[0][i], -lower[0] / self.slacks[1][i]);
-            most[0][i] = larger(slack, most[0][i]);
-            most[1][i] = larger(-upper[1] / self.multipliers[0][i], most[1][i]);
-            most[1][i] = larger(-lower[1] / self.multipliers[1][i], most[1][i]);
+            *most_of_slack = larger(slack, *most_of_slack);
+            let multiplier = larger(-upper[1] / self.multipliers[0][i], *most_of_multiplier);
+            *most_of_multiplier = larger(-lower[1] / self.multipliers[1][i], multiplier);
         }
     }
 

@@ -35,7 +35,7 @@ const ORDER: [usize; 8] = [6, 1, 4, 3, 0, 2, 5, 7];
 #[command(group = clap::ArgGroup::new("aim").required(true))]
 pub struct CompileArguments {
     /// Built-in part program, or part program file.
-    #[arg(value_name = "PROGRAM", value_parser = NonEmptyStringValueParser::new())]
+    #[arg(value_name = "FILE", value_parser = NonEmptyStringValueParser::new())]
     input: String,
     /// Built-in machine or machine file.
     #[arg(long, default_value = DEFAULT_MACHINE, value_parser = NonEmptyStringValueParser::new())]
