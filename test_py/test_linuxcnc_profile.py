@@ -28,7 +28,7 @@ def planned_time(folder: Path, machine: str, text: str) -> float:
         settings += [f"{axis}.limits.travel_min_mm=-9999", f"{axis}.limits.travel_max_mm=9999"]
     options = [word for setting in settings for word in ("--set", setting)]
     offset = ["--work-offset", "G54=0,0,0", "--dialect", "linuxcnc"]
-    command = [COMMAND, "psec", program, "--machine", name, *options, *offset, "--out", setpoints, "-q"]
+    command = [COMMAND, "psec", program, "--machine", name, *options, *offset, "--out", setpoints]
     subprocess.run(command, check=True, capture_output=True, timeout=120)
     with setpoints.open() as file:
         rows = [row[1:] for row in csv.reader(file)][1:]

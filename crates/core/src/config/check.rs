@@ -194,9 +194,15 @@ fn check_clock(set: &CrossChecks<'_>) -> Result<(), ConfigError> {
     Ok(())
 }
 
-/// Rejects parameters that have no effect with the profile.
+/// Rejects parameters that have no effect with the profile, but for those with their default, as in a dump.
 fn check_profile(set: &CrossChecks<'_>) -> Result<(), ConfigError> {
-    let mut keys = set.entries.keys().filter(|key| key.starts_with(CONTROL) && *key != PROFILE);
+    let is_default = |key: &str, value: &Value| {
+        let presence = plain_definition(key).map(|definition| definition.presence);
+        matches!(presence, Some(Presence::Default(default)) if Value::from(default) == *value)
+    };
+    let belongs = |key: &str| key.starts_with(CONTROL) && key != PROFILE;
+    let given = set.entries.iter().filter(|(key, entry)| belongs(key) && !is_default(key, &entry.value));
+    let mut keys = given.map(|(key, _)| key);
     match keys.next() {
         Some(key) if set.is_chosen(PROFILE, ControlProfile::Own.name()) => {
             let allowed =
