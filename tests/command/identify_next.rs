@@ -65,7 +65,7 @@ fn listed(folder: &TestFolder, file: &str, more: &str) -> (String, String) {
 #[test]
 fn the_next_command_runs_as_printed_for_every_set_of_columns() {
     let mm = 1e-3;
-    let cases: [(&str, String, &str, &str); 6] = [
+    let cases: [(&str, String, &str, &str); 7] = [
         // Units in the headers.
         (
             "units.csv",
@@ -108,6 +108,14 @@ fn the_next_command_runs_as_printed_for_every_set_of_columns() {
             csv(Some(("time", 1.0)), &["x"], [("psec", 1.0), ("position", 1.0), ("current", 1.0)]),
             "",
             "--axis x",
+        ),
+        // Columns between blanks.
+        (
+            "blanks.txt",
+            csv(Some(("time", 1.0)), &["x", "z"], [("psec_#_mm", mm), ("pos_#_mm", mm), ("current_#", 1.0)])
+                .replace(',', "  "),
+            "",
+            "--axis all",
         ),
         // Currents in mA.
         (
@@ -200,6 +208,26 @@ fn names_of_axes_and_of_the_file_belong_together() {
     assert_rejected(&[one.as_slice(), &["--joint", "1"]].concat(), &["--joint: 1 names for the 2 axes"]);
     assert_rejected(&["identify", &trace, "--axis", "x,x"], &["--axis: x is given twice"]);
     assert_rejected(&["identify", &trace, "--new-machine", "New"], &["--axis"]);
+}
+
+#[test]
+fn axes_without_the_letter_of_an_axis_are_named() {
+    let folder = TestFolder::new("identify_unnamed");
+    let signals = [("DES_POS|#", 1e-3), ("ENC_POS|#", 1e-3), ("CURRENT|#", 1.0)];
+    for (names, joints) in [(["1", "6"], "--joint 1,6"), (["X1", "Q4"], "--joint x,Q4")] {
+        let trace = folder.file("trace.csv", csv(Some(("time", 1.0)), &names, signals));
+        let trace = trace.to_string_lossy().into_owned();
+        let all = ["identify", &trace, "--axis", "all", "--new-machine", "New", "--no-refine", "--json"];
+        let found: serde_json::Value = serde_json::from_slice(&run(&all).stdout).expect("JSON");
+        let found = found.as_array().expect("a list");
+        assert_eq!(found.iter().map(|axis| &axis["axis"]).collect::<Vec<_>>(), ["x"]);
+        let finding = found[0]["findings"].as_array().into_iter().flatten();
+        let finding = finding.map(|finding| (&finding["code"], &finding["text"]));
+        let (_, text) = finding.into_iter().find(|(code, _)| *code == "unnamed-axes").expect("a finding");
+        let text = text.as_str().expect("a text");
+        assert!(text.starts_with(&format!("not identified: {} of the recordings", names[1])), "{text}");
+        assert!(text.ends_with(&format!("--axis x,NAME {joints}")), "{text}");
+    }
 }
 
 #[test]

@@ -37,6 +37,8 @@ const FEWEST_SAMPLES: usize = 6;
 const DETERMINED: f64 = 4.0;
 /// Highest cut-off frequency, Hz: faster currents are those of elastic parts and of the sampling.
 const CUTOFF: f64 = 25.0;
+/// Standard errors of a 95 % interval.
+const INTERVAL: f64 = 1.96;
 /// Standard errors of a significant gravity.
 const SIGNIFICANT: f64 = 3.0;
 /// Gravity relative to friction below which it is neglected.
@@ -420,7 +422,7 @@ fn fit_plant_by_regression(
 }
 
 /// Returns center and half width of the gravity currents that the standstills permit, A: friction holds the axis with any
-/// current within ±i0.
+/// current within ±`i0`, the largest that is probable.
 fn gravity_at_rest(still: &[f64], i0: f64) -> Option<(GravityCurrent, GravityCurrent)> {
     if still.len() < FEWEST_STILL {
         return None;
@@ -454,6 +456,8 @@ fn result(
     to_law[(3, 5)] = law.d;
     let of_law = &to_law * &covariance * to_law.transpose();
     let errors = [0, 1, 2, 3].map(|k| of_law[(k, k)].max(0.0).sqrt());
+    // i0 = a + c.
+    let i0_error = (of_law[(0, 0)] + of_law[(2, 2)] + 2.0 * of_law[(0, 2)]).max(0.0).sqrt();
     let force = axis.motor.torque_constant / axis.transmission_ratio;
     let only = |constant| GravityCurrent { constant, ..GravityCurrent::default() };
     let mut collinear = Vec::new();
@@ -486,7 +490,7 @@ fn result(
             tilt: None,
             phase: None,
             source: GravitySource::Regression,
-            at_rest: gravity_at_rest(&data.still, law.i0),
+            at_rest: gravity_at_rest(&data.still, law.i0 + INTERVAL * i0_error),
         },
         r_squared,
         ripple: has_ripple.then(|| (x[RIPPLE], error(RIPPLE))),

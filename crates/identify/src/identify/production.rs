@@ -370,13 +370,15 @@ fn report_ripple(inputs: &[IdentificationInput<'_>], periods: &Periods, found: &
     let tsp = seconds(found.periods.unwrap_or(*periods).position);
     let is_at_one_phase = inputs.iter().any(|input| stride(tsp, input.signals.period).is_some());
     let Some((share, error)) = found.current_ripple.filter(|_| is_at_one_phase) else { return };
+    // Signals have no negative part of a ripple.
+    let percent = |x: f64| 100.0 * x.clamp(0.0, 1.0);
     found.findings.push(Finding::note(
         "current-ripple",
         format!(
-            "the current contains {:.0} ± {:.0} % of the ripple that the setpoints of the position cycles cause at their \
+            "the current contains {:.0} to {:.0} % of the ripple that the setpoints of the position cycles cause at their \
              beginning (100 %: current of that instant, 0 %: mean over a cycle); the standard error of the inertia includes it",
-            100.0 * share,
-            100.0 * error
+            percent(share - INTERVAL * error),
+            percent(share + INTERVAL * error)
         ),
     ));
 }

@@ -115,8 +115,9 @@ pub(super) fn fields(line: &str) -> Fields<'_> {
 }
 
 /// Splits a line at a delimiter into fields, without surrounding spaces and quotation marks. A delimiter within
-/// quotation marks belongs to the field.
+/// quotation marks belongs to the field. Several blanks are one delimiter.
 pub(super) fn fields_between(line: &str, delimiter: char) -> Fields<'_> {
+    let line = if delimiter == ' ' { line.trim() } else { line };
     let plain = u8::try_from(delimiter).ok().filter(u8::is_ascii);
     let plain = plain.filter(|_| memchr(b'"', line.as_bytes()).is_none());
     Fields { rest: Some(line), delimiter, plain }
@@ -154,7 +155,8 @@ impl<'a> Iterator for Fields<'a> {
         let rest = self.rest?;
         let field = match self.end(rest) {
             Some(end) => {
-                self.rest = Some(&rest[end + self.delimiter.len_utf8()..]);
+                let after = &rest[end + self.delimiter.len_utf8()..];
+                self.rest = Some(if self.delimiter == ' ' { after.trim_start() } else { after });
                 &rest[..end]
             }
             None => {
@@ -235,6 +237,12 @@ mod tests {
                 .map(|f| f.strip_prefix('"').and_then(|f| f.strip_suffix('"')).map_or(f, str::trim))
                 .collect();
             prop_assert_eq!(fields_between(&text, delimiter).collect::<Vec<_>>(), wanted);
+        }
+
+        #[test]
+        fn several_blanks_are_one_delimiter(words in prop::collection::vec("[a0.]{1,3}", 1..6), blanks in 1usize..4) {
+            let line = " ".to_owned() + &words.join(&" ".repeat(blanks)) + "  ";
+            prop_assert_eq!(fields_between(&line, ' ').collect::<Vec<_>>(), words);
         }
 
         #[test]

@@ -38,7 +38,7 @@ pub fn moving_axes(
     recordings: &[PathBuf],
     reading: &RecordingArguments,
     config: &MachineConfig,
-) -> Result<(Vec<SelectedAxis>, Vec<String>), Box<dyn Error>> {
+) -> Result<(Vec<SelectedAxis>, Option<Finding>), Box<dyn Error>> {
     let (mut moving, mut resting) = (Vec::new(), Vec::new());
     for selected in axes {
         let axis = &config.axes()[axis::index(config, &selected.name)?];
@@ -59,7 +59,9 @@ pub fn moving_axes(
     if moving.is_empty() {
         return Err(format!("--axis all: no axis moves in the recordings ({})", resting.join(", ")).into());
     }
-    Ok((moving, resting))
+    let what = || format!("at rest, not identified: {}", resting.join(", "));
+    let finding = (!resting.is_empty()).then(|| Finding::note("at-rest", what()));
+    Ok((moving, finding))
 }
 
 /// Removes axes without a valid result from a new machine if another has one. Returns a line for each.
@@ -84,11 +86,6 @@ pub fn exclude(
     let names: Vec<&str> = found.iter().map(|found| found.summary.axis.as_str()).collect();
     *identified = with_axes(identified, &names)?;
     Ok(reasons.into_iter().map(|reason| format!("not an axis of the new machine: {reason}")).collect())
-}
-
-/// Returns the finding about the axes that do not move in the recordings.
-pub fn at_rest(names: &[String]) -> Finding {
-    Finding::note("at-rest", format!("at rest, not identified: {}", names.join(", ")))
 }
 
 /// Results of the axes of a machine.

@@ -20,7 +20,7 @@ use virtual_axes_identify::identify::{
     AxisIdentification, AxisRecordings, Breakaway, ConditionedRecording, IdentificationOptions,
     RefinementScope,
 };
-use virtual_axes_identify::recording::StatedValues;
+use virtual_axes_identify::recording::{Finding, StatedValues};
 use virtual_axes_io::files::OutputFile;
 use virtual_axes_report::{IdentificationPage, identification_document};
 
@@ -122,8 +122,8 @@ impl IdentifyArguments {
 struct Start {
     parameters: Parameters,
     axes: Vec<SelectedAxis>,
-    /// Names of recorded axes that do not move.
-    resting: Vec<String>,
+    /// What is said of the other axes of the recordings.
+    others: Vec<Finding>,
 }
 
 /// Runs the command and returns tables or JSON.
@@ -131,7 +131,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     check_listing(arguments)?;
     check_outputs(arguments)?;
     let Some(axes) = &arguments.axis else { return listing(arguments) };
-    let Start { parameters, axes, resting } = start(arguments, axes)?;
+    let Start { parameters, axes, others } = start(arguments, axes)?;
     let config = parameters.machine_config()?;
     let indices = axes.iter().map(|selected| axis::index(&config, &selected.name));
     let indices: Vec<usize> = indices.collect::<Result<_, _>>()?;
@@ -157,9 +157,8 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
             }
             _ => axes::identify_all(&parameters, &indices, one)?,
         };
-    if !resting.is_empty() && arguments.output.format() == OutputFormat::Json {
-        let finding = axes::at_rest(&resting);
-        found.iter_mut().for_each(|found| found.summary.findings.push(finding.clone()));
+    if arguments.output.format() == OutputFormat::Json {
+        found.iter_mut().for_each(|found| found.summary.findings.extend(others.iter().cloned()));
     }
     let mut excluded = Vec::new();
     if arguments.new_machine.is_some() && !is_single(arguments) {
@@ -182,8 +181,8 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     }
     drop(spinner);
     if matches!(arguments.output.format(), OutputFormat::Text | OutputFormat::Quiet) {
-        let resting = (!resting.is_empty()).then(|| axes::at_rest(&resting).what);
-        texts.extend(excluded.iter().chain(&resting).map(|line| text_table::wrapped_line(line)));
+        let others = others.iter().map(|finding| &finding.what);
+        texts.extend(excluded.iter().chain(others).map(|line| text_table::wrapped_line(line)));
     }
     joined(arguments, &summaries, &texts)
 }
@@ -212,24 +211,28 @@ fn start(arguments: &IdentifyArguments, axes: &str) -> Result<Start, Box<dyn Err
             |axes: &[SelectedAxis]| new_machine::parameters(name, axes, &files, (&arguments.set, reading));
         if !is_all {
             let axes = selected()?;
-            return Ok(Start { parameters: new(&axes)?, axes, resting: Vec::new() });
+            return Ok(Start { parameters: new(&axes)?, axes, others: Vec::new() });
         }
         let recorded = selection::recorded_axes(&files, reading)?;
         let config = new(&recorded)?.machine_config()?;
+        let unnamed = selection::unnamed_axes(&files, reading, &recorded)?;
         let (axes, resting) = axes::moving_axes(recorded, &files, reading, &config)?;
-        return Ok(Start { parameters: new(&axes)?, axes, resting });
+        return Ok(Start {
+            parameters: new(&axes)?,
+            axes,
+            others: resting.into_iter().chain(unnamed).collect(),
+        });
     }
     let machine = Parameters::load(&arguments.machine, crate::builtin::MACHINES)?;
     let parameters = variant::parameters(&machine, None, &arguments.set, &[])?;
     let config = variant::checked(&parameters, &machine, &arguments.machine)?;
-    let (axes, resting) = match is_all {
-        true => {
-            let recorded = columns::recorded_axes(&files, reading, &config)?;
-            axes::moving_axes(recorded, &files, reading, &config)?
-        }
-        false => (selected()?, Vec::new()),
-    };
-    Ok(Start { parameters, axes, resting })
+    if !is_all {
+        return Ok(Start { parameters, axes: selected()?, others: Vec::new() });
+    }
+    let recorded = columns::recorded_axes(&files, reading, &config)?;
+    let unnamed = selection::unnamed_axes(&files, reading, &recorded)?;
+    let (axes, resting) = axes::moving_axes(recorded, &files, reading, &config)?;
+    Ok(Start { parameters, axes, others: resting.into_iter().chain(unnamed).collect() })
 }
 
 /// Returns true if `--axis` names one axis.

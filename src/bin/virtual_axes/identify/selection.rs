@@ -4,6 +4,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use virtual_axes_core::text::shortened;
+use virtual_axes_identify::recording::Finding;
 use virtual_axes_io::files::{RecordingFormat, inspect_recording};
 
 use crate::identify::recordings::RecordingArguments;
@@ -95,6 +96,43 @@ pub fn recorded_axes(
         });
     }
     Ok(common.unwrap_or_default())
+}
+
+/// Returns the finding about axes of the recordings whose names `--axis all` does not know as those of `axes`.
+///
+/// # Errors
+/// Returns an error if a recording cannot be read.
+pub fn unnamed_axes(
+    recordings: &[PathBuf],
+    reading: &RecordingArguments,
+    axes: &[SelectedAxis],
+) -> Result<Option<Finding>, Box<dyn Error>> {
+    let options = reading.options()?;
+    let mut unnamed: Vec<String> = Vec::new();
+    for path in recordings {
+        let found = inspect_recording(path, &options)?;
+        let of = |axis: &SelectedAxis| match &axis.joint {
+            Some(joint) => Some(joint.clone()),
+            None => found.axis_of(&axis.name).map(str::to_owned),
+        };
+        let named: Vec<String> = axes.iter().filter_map(of).collect();
+        let is_new = |name: &String| !name.is_empty() && !named.contains(name) && !unnamed.contains(name);
+        let new: Vec<String> = found.readable_axes().into_iter().filter(is_new).collect();
+        unnamed.extend(new);
+    }
+    let names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
+    let joints: Vec<&str> = axes.iter().map(|axis| axis.joint.as_deref().unwrap_or(&axis.name)).collect();
+    let what = || {
+        format!(
+            "not identified: {} of the recordings, whose names are no axes of the machine; name both, for example --axis {},NAME \
+             --joint {},{}",
+            unnamed.join(", "),
+            names.join(","),
+            joints.join(","),
+            unnamed[0]
+        )
+    };
+    Ok((!unnamed.is_empty()).then(|| Finding::note("unnamed-axes", what())))
 }
 
 #[cfg(test)]

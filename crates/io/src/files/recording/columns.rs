@@ -65,10 +65,11 @@ pub(super) enum Column {
 const DELIMITER: &str = "delimiter";
 const DECIMAL_COMMA: &str = "decimal_comma";
 const SKIP_LINES: &str = "skip_lines";
-/// Word for the tab character.
+/// Words for the tab character, and for any number of blanks.
 const TAB: &str = "tab";
+const SPACE: &str = "space";
 
-/// Detected delimiters; the one with the fewest other uses first.
+/// Detected delimiters; the one with the fewest other uses first. Without them blanks delimit.
 const USUAL_DELIMITERS: [char; 3] = [';', '\t', ','];
 
 fn keys() -> impl Iterator<Item = &'static str> {
@@ -210,10 +211,7 @@ impl Columns {
     pub(super) fn delimiter_of(&self, text: &str) -> char {
         let found = || {
             let usable = |d: &char| !(self.decimal_comma && *d == ',');
-            USUAL_DELIMITERS
-                .into_iter()
-                .find(|d| usable(d) && text.contains(*d))
-                .unwrap_or(USUAL_DELIMITERS[0])
+            USUAL_DELIMITERS.into_iter().find(|d| usable(d) && text.contains(*d)).unwrap_or(' ')
         };
         self.delimiter.unwrap_or_else(found)
     }
@@ -229,11 +227,12 @@ const MAX_FILE_BYTES: u64 = 1 << 16;
 
 /// Allowed delimiters, for error messages.
 const DELIMITERS: &str =
-    "must be one character that does not occur in numbers, such as ; or |, or the word tab";
+    "must be one character that does not occur in numbers, such as ; or |, or one of the words tab and space";
 
 fn delimiter(text: &str) -> Option<char> {
     let text = match text {
         TAB | "\\t" => "\t",
+        SPACE => return Some(' '),
         text => text,
     };
     let mut characters = text.chars();
