@@ -353,7 +353,7 @@ pub(super) struct Codes {
 
 impl Codes {
     /// Sorts the G codes, in tenths, and M codes of a line into their groups. `has_mapping` is true if the line has words
-    /// of G107, `is_cancelling` if it has the word P0.
+    /// of G107, `has_p0` if it has the word P0.
     ///
     /// # Errors
     ///
@@ -362,7 +362,7 @@ impl Codes {
         g: &[u16],
         m: &[u32],
         has_mapping: bool,
-        is_cancelling: bool,
+        has_p0: bool,
         dialect: Dialect,
     ) -> Outcome<Self> {
         let mut codes = Codes::default();
@@ -382,7 +382,7 @@ impl Codes {
             let is_in_effect = match code {
                 // Without words, G107 ends the mapping.
                 1070 => has_mapping,
-                542 | 544 => !is_cancelling,
+                542 | 544 => !has_p0,
                 _ => false,
             };
             match WITHOUT_EFFECT.iter().find(is_without_effect).filter(|_| !is_in_effect) {

@@ -37,8 +37,8 @@ impl State {
         }
         self.moves_in_machine_coordinates = false;
         let has_mapping = block.has_any(&['A', 'B', 'C', 'Q', 'R']);
-        let is_cancelling = block.get('P') == Some(0.0);
-        let codes = Codes::new(&block.g, &block.m, has_mapping, is_cancelling, self.dialect)?;
+        let has_p0 = block.get('P') == Some(0.0);
+        let codes = Codes::new(&block.g, &block.m, has_mapping, has_p0, self.dialect)?;
         if self.request_macro(block, &codes)? {
             return Ok(());
         }
