@@ -55,11 +55,14 @@ fn the_summary_has_motions_time_and_extents() {
 fn words_and_positions_beyond_the_machine_are_rejected_with_their_line() {
     for (text, expected) in [
         (
-            "G0 X10\nG16\n",
+            "G64 P0.1\nG16\n",
             ":2: G16 is not supported in the dialect linuxcnc: known in --dialect fanuc or haas",
         ),
         ("G0 B5\n", ":1: word B: the machine has no axis B; axes: X Y Z A C\n"),
-        ("M200\n", ":1: M200 is not supported in the dialect linuxcnc: skip it with --ignore M200\n"),
+        (
+            "G64 P0.1\nM200\n",
+            ":2: M200 is not supported in the dialect linuxcnc: skip it with --ignore M200\n",
+        ),
         (
             "G0 X10\nG1 F100 Y-300\n",
             ":2: y at -0.3 m (-300 mm) is outside of its travel limits -0.275 m (-275 mm) to 0.275 m (275 mm)\n",

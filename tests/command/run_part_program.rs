@@ -100,8 +100,9 @@ fn ignored_codes_are_noted_by_each_command() {
         &["robustness", &name],
     ];
     for command in commands {
-        assert_rejected(command, &["part.nc:1: M250 is not supported in the dialect linuxcnc"]);
-        let output = run(&[command, &["--ignore", "M2xx,7"]].concat());
+        let command = [command, &["--dialect", "linuxcnc"]].concat();
+        assert_rejected(&command, &["part.nc:1: M250 is not supported in the dialect linuxcnc"]);
+        let output = run(&[&command, ["--ignore", "M2xx,7"].as_slice()].concat());
         let notes = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.success(), "{notes}");
         let expected = [

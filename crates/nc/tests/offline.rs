@@ -317,3 +317,23 @@ fn errors_against_another_program_contain_the_distance_of_its_path() {
     assert!((found.max - 50e-6).abs() < own.max, "{found:?} {own:?}");
     assert!(found.rms > 30e-6, "{found:?}");
 }
+
+#[test]
+fn short_lines_bound_their_corners_which_a_note_says() {
+    let notes = |tolerance: &str| {
+        let text = format!("G21 G90 G17\nG64 {tolerance}\nG1 X100 F15000\nY100\nX0\nY0\nM2\n");
+        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("corners.ngc");
+        fs::write(&path, text).unwrap();
+        let (machine, name) = (machine(), path.to_str().unwrap());
+        let (track, options) = (RefCell::new(ProgramTrack::default()), PartProgramOptions::default());
+        let mut source = PartProgramSource::open(name, PROGRAMS, &machine, &options, &track).unwrap();
+        let mut row = vec![0.0; machine.axes().len()];
+        while source.next(&mut row).unwrap() {}
+        let notes = track.borrow().notes();
+        notes.into_iter().filter(|(_, note)| note.contains("corners")).collect::<Vec<_>>()
+    };
+    assert_eq!(notes("P5"), []);
+    // Knots of a quarter of 100 mm, two unit directions at a right angle: 25 √2 / 6.
+    let text = "G64 P: 3 corners are passed nearer than P, at most 5.893 mm away: the lines beside them are too short";
+    assert_eq!(notes("P10"), [(4, text.to_owned())]);
+}

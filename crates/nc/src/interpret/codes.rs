@@ -122,6 +122,7 @@ codes! {
         Shift = 520 in OTHERS, "G52: shifts all coordinate systems";
         MachineCoordinates = 530 in OTHERS, "G53: line in machine coordinates";
         TiltTool = 531 in FH, "G53.1: turns the tool axis normal to the tilted plane";
+        TiltTool253 = 2530 in HAAS, "G253: turns the tool axis normal to the tilted plane";
         MacroCall = 650 in FHM, "G65: calls a macro";
         ShiftToPosition = 920 in ALL, "G92: shifts all coordinate systems to coordinates of the position";
         ClearShift = 921 in ALL, "G92.1: clears the shift";
@@ -222,6 +223,8 @@ codes! {
         On = 680 in FHM, "G68: rotation in the plane";
         Tilted = 682 in FH, "G68.2: tilted plane";
         ByTool = 683 in FH, "G68.3: plane normal to the tool axis";
+        Feature = 2680 in HAAS, "G268: tilted plane by roll, pitch and yaw";
+        FeatureOff = 2690 in HAAS, "G269: end of the tilted plane";
         Off = 690 in FHM, "G69: end of rotation and tilted plane";
         ShiftAndTurn = 110 in OKUMA, "G11: shift and rotation of coordinates";
         OffByG10 = 100 in OKUMA, "G10: end of the rotation";
@@ -271,20 +274,28 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
     (70, LINUXCNC, ""),
     (80, LINUXCNC, ""),
     (80, FH | OKUMA, "P"),
+    (54, FH, "Q"),
     (110, FH, ""),
+    (131, FH, ""),
     (220, FH | OKUMA, "XYZIJK"),
     (230, FH | OKUMA, ""),
+    (250, FH, ""),
+    (260, FH, "PQRI"),
     (291, FH | NGC, ""),
     (350, HAAS, ""),
     (401, FH, ""),
     (491, FH, ""),
     (501, MACH3, ""),
+    (502, FH, ""),
+    (542, FH, "P"),
+    (544, FH, "P"),
     (611, FH, ""),
     (620, FH, ""),
     (630, FH, ""),
     (970, GRBL, ""),
     (1030, HAAS, "P"),
     (1070, HAAS, ""),
+    (1130, FH, ""),
     (1300, OKUMA, ""),
     (1310, OKUMA, "DEFIJKLPR"),
     (1320, OKUMA, "DEFIJKLPR"),
@@ -299,6 +310,9 @@ const REMEDIES: &[(u16, &str)] = &[
     (71, "cylindrical interpolation: program the motions of the axes"),
     (121, "polar coordinate interpolation: program the motions of the axes"),
     (320, "threading on a lathe: no axis of the machine turns the workpiece"),
+    (542, "dynamic fixture offset of a turned table: program a work offset for each position"),
+    (544, "compensation of the workpiece setting error: program a work offset"),
+    (600, "unidirectional positioning: program G0"),
     (470, "engraving of text: let the CAM system output the motions"),
     (760, "threading on a lathe: no axis of the machine turns the workpiece"),
     (1070, "cylindrical mapping: let the CAM system output the motions of the axes"),
@@ -339,12 +353,18 @@ pub(super) struct Codes {
 
 impl Codes {
     /// Sorts the G codes, in tenths, and M codes of a line into their groups. `has_mapping` is true if the line has words
-    /// of G107.
+    /// of G107, `has_p0` if it has the word P0.
     ///
     /// # Errors
     ///
     /// Two codes of one group, if the dialect does not allow them.
-    pub(super) fn new(g: &[u16], m: &[u32], has_mapping: bool, dialect: Dialect) -> Outcome<Self> {
+    pub(super) fn new(
+        g: &[u16],
+        m: &[u32],
+        has_mapping: bool,
+        has_p0: bool,
+        dialect: Dialect,
+    ) -> Outcome<Self> {
         let mut codes = Codes::default();
         for &code in g {
             if code == Motion::NurbsEnd.number() && dialect == Dialect::LinuxCnc {
@@ -359,9 +379,13 @@ impl Codes {
                 continue;
             }
             let is_without_effect = |row: &&(u16, u8, &str)| row.0 == code && row.1 & dialect.bit() != 0;
-            // Without words, G107 ends the mapping.
-            let is_mapping = code == 1070 && has_mapping;
-            match WITHOUT_EFFECT.iter().find(is_without_effect).filter(|_| !is_mapping) {
+            let is_in_effect = match code {
+                // Without words, G107 ends the mapping.
+                1070 => has_mapping,
+                542 | 544 => !has_p0,
+                _ => false,
+            };
+            match WITHOUT_EFFECT.iter().find(is_without_effect).filter(|_| !is_in_effect) {
                 Some((_, _, letters)) => codes.without_effect.push((g_name(code), letters)),
                 None => codes.unsupported.push((g_name(code), remedy(code, dialect))),
             }

@@ -49,6 +49,8 @@ impl State {
             5041..=5049 => self.coordinate(axis(5041)),
             5061..=5069 => self.coordinate(axis(5061)),
             5083 => self.offsets.tool_length / self.modal.length,
+            // Common variables.
+            98_000..=98_499 | 500_000.. => f64::NAN,
             _ => 0.0,
         }
     }

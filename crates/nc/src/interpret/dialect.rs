@@ -110,7 +110,12 @@ impl DetectedDialect {
             if read == 0 || bytes > DETECTION_BYTES {
                 break;
             }
-            add_evidence(&String::from_utf8_lossy(&line).trim().to_ascii_uppercase(), number, &mut scores);
+            let text = String::from_utf8_lossy(&line).trim().to_ascii_uppercase();
+            if foreign_format(&text).is_some() {
+                scores = Default::default();
+                break;
+            }
+            add_evidence(&text, number, &mut scores);
         }
         if source.seek(SeekFrom::Start(0)).is_err() {
             scores = Default::default();
@@ -158,7 +163,7 @@ pub(super) fn foreign_format(line: &str) -> Option<&'static str> {
     const APT: [&str; 8] =
         ["PARTNO", "TOOL PATH/", "MULTAX/", "LOADTL/", "CUTTER/", "GOTO/", "MACHIN/", "TLDATA/"];
     let text = line.trim_start_matches(|letter: char| letter.is_ascii_digit() || letter == ' ');
-    if text.starts_with("BEGIN PGM") {
+    if ["BEGIN PGM", "BLK FORM", "TOOL CALL", "CYCL DEF"].iter().any(|word| text.starts_with(word)) {
         return Some("a conversational program of Heidenhain (Klartext)");
     }
     if APT.iter().any(|word| text.starts_with(word)) {
@@ -216,10 +221,17 @@ enum Pattern {
     ConditionalLine,
     /// Common variable: `VC1`, `VC[1]`.
     CommonVariable,
+    /// Command of grbl: `$H`, `$$`, `$10=3`.
+    Command,
+    /// M code from 200 on, which LinuxCNC lacks.
+    HighAuxiliary,
+    /// G28 with letters alone: `G28 X Y`.
+    Homing,
 }
 
 use Pattern::{
-    Assignment, Code, Comment, CommonVariable, ConditionalLine, Head, OWord, Pair, ProgramNumber, Start, Word,
+    Assignment, Code, Command, Comment, CommonVariable, ConditionalLine, Head, HighAuxiliary, Homing, OWord,
+    Pair, ProgramNumber, Start, Word,
 };
 
 /// Evidence: dialects as bits, points, and the text.
@@ -250,6 +262,11 @@ const RULES: &[(u8, u32, Pattern)] = &[
     (FANUC | HAAS, 3, Code("#3000=")),
     (FANUC | HAAS, 3, Code("DPRNT[")),
     (FANUC | HAAS, 3, Word("G68.2")),
+    (FANUC | HAAS | MACH3, 3, Word("G15")),
+    (FANUC | HAAS | MACH3, 3, Word("G16")),
+    (FANUC | HAAS | MACH3, 3, Word("G51")),
+    (FANUC | HAAS | MACH3, 3, Word("G68")),
+    (FANUC | HAAS | MACH3, 3, Word("G69")),
     (FANUC, 3, Code("G05.1Q")),
     (FANUC, 3, Code("G5.1Q")),
     (FANUC, 3, Word("G05P10000")),
@@ -261,6 +278,10 @@ const RULES: &[(u8, u32, Pattern)] = &[
     (HAAS, 4, Word("G187")),
     (HAAS, 4, Word("G154")),
     (HAAS, 4, Word("G150")),
+    (HAAS | MACH3, 3, Pair("G12", 'I')),
+    (HAAS | MACH3, 3, Pair("G13", 'I')),
+    (HAAS, 4, Word("G101")),
+    (HAAS, 4, Word("G268")),
     (HAAS, 4, Code("G70I")),
     (HAAS, 4, Code("G71I")),
     (HAAS, 4, Code("G72I")),
@@ -272,7 +293,7 @@ const RULES: &[(u8, u32, Pattern)] = &[
     (HAAS, 4, Word("G129")),
     (SINUMERIK, 8, Start("%_N_")),
     (SINUMERIK, 6, Assignment),
-    (SINUMERIK, 6, Code("CYCLE8")),
+    (SINUMERIK, 6, Code("CYCLE")),
     (SINUMERIK, 6, Code("MCALL")),
     (SINUMERIK, 6, Code("TRAORI")),
     (SINUMERIK, 6, Code("TRAFOOF")),
@@ -307,9 +328,10 @@ const RULES: &[(u8, u32, Pattern)] = &[
     (SINUMERIK, 6, Code("HOLES")),
     (SINUMERIK, 6, Comment("SINUMERIK")),
     (SINUMERIK, 6, Comment("SIEMENS")),
-    (GRBL, 6, Start("$H")),
-    (GRBL, 6, Start("$J=")),
-    (GRBL, 6, Start("$X")),
+    (GRBL, 6, Command),
+    (GRBL, 3, Code("M117")),
+    (GRBL, 3, HighAuxiliary),
+    (GRBL, 3, Homing),
     (GRBL, 6, Comment("GRBL")),
     (MACH3, 6, Comment("MACH3")),
     (MACH3, 6, Comment("MACH2")),
@@ -334,7 +356,13 @@ const RULES: &[(u8, u32, Pattern)] = &[
 const COMMENT_LINES: usize = 60;
 
 fn add_evidence(line: &str, number: usize, scores: &mut [Score; Dialect::ALL.len()]) {
-    let code = code_of(line);
+    let mut code = code_of(line);
+    // Texts for the operator.
+    if let Some(message) = ["M117", "M118", "M0"].into_iter().find(|message| code.starts_with(message)) {
+        code.truncate(message.len());
+    } else if code.starts_with('%') && !code.starts_with("%_N_") {
+        code.truncate(1);
+    }
     for (index, (dialects, points, pattern)) in RULES.iter().enumerate() {
         let Some(text) = pattern.text_in(line, &code, number) else { continue };
         for (dialect, score) in Dialect::ALL.into_iter().zip(scores.iter_mut()) {
@@ -372,6 +400,9 @@ impl Pattern {
             }
             ConditionalLine => found(has_conditional_line(code), "IF with a line"),
             CommonVariable => found(has_common_variable(code), "a variable VC"),
+            Command => found(is_command(code), "a command $"),
+            Homing => found(is_homing(code), "G28 with letters alone"),
+            HighAuxiliary => found(has_high_auxiliary(code), "an M code from 200 on"),
         }
     }
 }
@@ -444,6 +475,27 @@ fn has_common_variable(code: &str) -> bool {
     })
 }
 
+/// Returns true for a command of grbl: `$$`, `$H`, `$J=…`, `$10=3`.
+fn is_command(code: &str) -> bool {
+    let Some(command) = code.strip_prefix('$') else { return false };
+    let is_name = ["$", "#", "I", "G", "N", "C", "H", "X", "SLP", "HX", "HY", "HZ"].contains(&command);
+    let setting = command.split_once('=').map(|(setting, _)| setting);
+    is_name || setting.is_some_and(|name| name == "J" || name.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
+/// Returns true for `G28 X Y`, as firmware for printers and routers has it.
+fn is_homing(code: &str) -> bool {
+    let axes = code.strip_prefix("G28").unwrap_or_default();
+    !axes.is_empty() && axes.bytes().all(|axis| b"XYZ".contains(&axis))
+}
+
+/// Returns true for a line that begins with an M code from 200 on; M428 to M430 are those of LinuxCNC.
+fn has_high_auxiliary(code: &str) -> bool {
+    let Some(rest) = code.strip_prefix('M') else { return false };
+    let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
+    rest[..digits].parse().is_ok_and(|number: u32| number >= 200 && !(428..=430).contains(&number))
+}
+
 fn has_assignment(code: &str) -> bool {
     code.match_indices('=').any(|(at, _)| {
         let before = &code[..at];
@@ -477,6 +529,15 @@ mod tests {
             ("N10 G54 D1\nN20 TRAORI\n", ("sinumerik", Some(2))),
             ("G43.4 H1\nG0 A40\nG4 P0.4\n", ("linuxcnc", None)),
             ("$H\nG21\nG0 X1\n", ("grbl", Some(1))),
+            ("$I ; build\n$10=3\nG0 X1\n", ("grbl", Some(1))),
+            ("G21\nM2000;custom\nG0 X1\n", ("grbl", Some(2))),
+            ("G68 X0 Y0 R30\nG0 X1\n", ("fanuc", Some(1))),
+            ("(post: Mach3)\nG68 A0 B0 R30\n", ("mach3", Some(1))),
+            ("M117 Pocket, holes\nG28 X Y\n", ("grbl", Some(1))),
+            ("% pocket\nG0 Z3\nG28 Z\n", ("grbl", Some(3))),
+            ("%\nO1\nG13 I0.25 F10.\n", ("haas", Some(2))),
+            ("M428\nG0 X1\n", ("linuxcnc", None)),
+            ("1 BEGIN PGM A MM\n2 FN 0: Q1=5\n", ("linuxcnc", None)),
             ("(post: grbl)\nG0 X1\n", ("grbl", Some(1))),
             ("(Mach3 mill)\nG0 X1\n", ("mach3", Some(1))),
             ("$PART.MIN%\nG0 X1\n", ("okuma", Some(1))),
@@ -485,7 +546,7 @@ mod tests {
             ("IF [VC1 EQ 2] N10\nX=VC2\n", ("okuma", Some(1))),
             ("N5 IF [VTLCN EQ 2] NEXT\n", ("okuma", Some(1))),
             ("o100 if [exists[#<p>] NE 1.]\n", ("linuxcnc", Some(1))),
-            ("M17\nG15\nG0 X1\n", ("linuxcnc", None)),
+            ("M17\nG15\nG0 X1\n", ("fanuc", Some(2))),
             ("#100=ACOS[0.5]\n#101=[#100*2]\nG0 X#101\n", ("linuxcnc", None)),
         ] {
             assert_eq!(detected(text), expected, "{text:?}");

@@ -37,7 +37,8 @@ impl State {
         }
         self.moves_in_machine_coordinates = false;
         let has_mapping = block.has_any(&['A', 'B', 'C', 'Q', 'R']);
-        let codes = Codes::new(&block.g, &block.m, has_mapping, self.dialect)?;
+        let has_p0 = block.get('P') == Some(0.0);
+        let codes = Codes::new(&block.g, &block.m, has_mapping, has_p0, self.dialect)?;
         if self.request_macro(block, &codes)? {
             return Ok(());
         }
@@ -376,7 +377,7 @@ impl State {
                 let end = self.targets(block)?;
                 self.rapid_to(&end)?;
             }
-            Some(Action::TiltTool) => self.tilt_tool(block)?,
+            Some(Action::TiltTool | Action::TiltTool253) => self.tilt_tool(block)?,
             Some(Action::ClockwisePocket) => self.circular_pocket(block, true)?,
             Some(Action::CounterclockwisePocket) => self.circular_pocket(block, false)?,
             Some(Action::StoreReference) => self.store_reference(0)?,

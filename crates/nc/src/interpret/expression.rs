@@ -112,7 +112,12 @@ impl<'a> Scanner<'a> {
     /// Reads the value of a word; `None` for a variable of macro B without value.
     pub(super) fn word_value(&mut self) -> Outcome<Option<f64>> {
         self.has_point = false;
-        Ok(Some(self.value()?).filter(|value| !value.is_nan()))
+        let value = self.value()?;
+        // `F[#1*2].`: a decimal point after an expression.
+        if self.has_macro_b() && self.text[..self.at].ends_with(b"]") {
+            self.has_point |= self.skip(".");
+        }
+        Ok(Some(value).filter(|value| !value.is_nan()))
     }
 
     /// Reads the value of a setting; of macro B an expression without brackets.

@@ -65,11 +65,17 @@ impl State {
                 let turned = CoordinateFrame::rotation(self.modal.plane.axes()[2], angle);
                 self.modal.frames[ROTATION] = CoordinateFrame::shift(shift).then(&turned);
             }
-            Some(Rotation::Off | Rotation::OffByG10) => {
+            Some(Rotation::Off | Rotation::OffByG10 | Rotation::FeatureOff) => {
                 self.modal.frames[ROTATION] = CoordinateFrame::identity();
                 self.tilt = None;
             }
             Some(Rotation::On) => self.modal.frames[ROTATION] = self.rotation(block)?,
+            Some(Rotation::Feature) => {
+                let origin = Vector3::from(self.center(block)?.map(Option::unwrap_or_default));
+                let angles = ['I', 'J', 'K'].map(|letter| block.take(letter).unwrap_or(0.0).to_radians());
+                let turned = roll_pitch_yaw(block.take_integer('Q')?.unwrap_or(321), angles)?;
+                self.tilt = Some(CoordinateFrame::shift(origin).then(&turned));
+            }
             Some(Rotation::Tilted) => {
                 if let Some(plane) = self.tilted(block)? {
                     self.tilt = Some(plane);

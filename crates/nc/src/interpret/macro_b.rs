@@ -172,7 +172,15 @@ fn is_true(value: f64) -> bool {
 fn loop_number(scanner: &mut Scanner<'_>, keyword: &str) -> Outcome<u32> {
     let text = scanner.found();
     let number = if scanner.skip(keyword) { integer(scanner.value()?) } else { None };
-    number.ok_or_else(|| format!("{text}: {} requires its number, as in {0}1", keyword.to_uppercase()))
+    let keyword = keyword.to_uppercase();
+    let number = number.ok_or_else(|| format!("{text}: {keyword} requires its number, as in {keyword}1"))?;
+    match scanner.peek() {
+        None => Ok(number),
+        Some(_) => Err(format!(
+            "{}: a line ends after {keyword}{number}: move the rest to a line of its own",
+            scanner.rest()
+        )),
+    }
 }
 
 /// Reads the number of a line after GOTO.

@@ -168,15 +168,36 @@ impl<R: BufRead + Seek> Interpreter<R> {
             if self.execute_statement(place)? {
                 return Ok(());
             }
-        } else if self.line.text.first() == Some(&b'$') && self.state.dialect == Dialect::Grbl {
-            let command = String::from_utf8_lossy(&self.line.text).to_uppercase();
-            self.state.note_without_effect(command);
+        } else if self.state.dialect == Dialect::Grbl && self.execute_command() {
             return Ok(());
         }
         if is_o_word(&self.line.text) && !self.state.dialect.has_macro_b() {
             return self.execute_o_word(place);
         }
         self.execute_words(0)
+    }
+
+    /// Executes a command of grbl (`$H`, `?`), or a message of firmware for printers and routers (`M117 Drill 2`, `M0 Put
+    /// tool 1`); returns false for a line of words.
+    fn execute_command(&mut self) -> bool {
+        let text = self.line.text.as_slice();
+        if matches!(text, [b'$', ..] | [b'?' | b'!' | b'~']) {
+            let command = String::from_utf8_lossy(text).to_uppercase();
+            self.state.note_without_effect(command);
+            return true;
+        }
+        // The blank after the code, which the compact text lacks, separates it from digits of the message.
+        let raw = String::from_utf8_lossy(&self.line.raw);
+        let (code, message) = raw.trim().split_once(char::is_whitespace).unwrap_or((raw.trim(), ""));
+        let message = message.trim();
+        let is_text = message.bytes().take(2).filter(u8::is_ascii_alphabetic).count() == 2;
+        match code.to_ascii_uppercase().as_str() {
+            "M117" | "M118" => {}
+            "M0" | "M00" if is_text => self.state.push_event(crate::motion::ProgramEvent::Stop),
+            _ => return false,
+        }
+        self.state.push_event(crate::motion::ProgramEvent::Message(escaped(message)));
+        true
     }
 
     /// Executes the words of the present line from a byte on.

@@ -100,7 +100,7 @@ pub(super) fn translate(line: &mut Vec<u8>) -> Outcome<Option<u32>> {
         _ if text.starts_with(b"goto") => jump(&text[4..], line)?,
         _ => words(text, line)?,
     }
-    if is_cycle_off {
+    if is_cycle_off && !line.is_empty() {
         // The cycle takes effect with the next line.
         line.extend_from_slice(b"l0");
     }

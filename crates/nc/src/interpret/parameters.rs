@@ -11,7 +11,7 @@ pub(super) const FIRST_OF_CONTROL: usize = 5000;
 /// Largest number of a parameter.
 const LAST: usize = 5602;
 /// Last number of a variable of macro B.
-const LAST_VARIABLE: usize = 99_999;
+const LAST_VARIABLE: usize = 999_999;
 /// First variable of macro B that belongs to the control.
 pub(super) const FIRST_VARIABLE_OF_CONTROL: usize = 1000;
 /// Largest number of arguments of a subprogram; of macro B, which has more local variables than LinuxCNC.

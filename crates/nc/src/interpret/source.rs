@@ -235,15 +235,12 @@ impl<R: BufRead + Seek> LineSource<R> {
                 self.has_text = true;
                 continue;
             }
-            // A percent sign encloses the program: before its first line with text, which may follow it, and after its
-            // last. Heads %_N_ of Sinumerik are lines.
+            // A percent sign encloses the program: before its first line with text, which may follow it, and alone after
+            // its last. Others begin a comment. Heads %_N_ of Sinumerik are lines.
             if let Some(rest) = text.strip_prefix(b"%")
                 && !rest.get(..3).is_some_and(|head| head.eq_ignore_ascii_case(b"_N_"))
             {
-                if self.has_text {
-                    if !is_comment(rest) {
-                        return Err("% encloses the program and is alone on its line".to_owned());
-                    }
+                if self.has_text && rest.trim_ascii().is_empty() {
                     return Ok(false);
                 }
                 self.has_text = true;

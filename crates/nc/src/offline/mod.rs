@@ -1,11 +1,13 @@
 //! Part programs simulated without a node: their setpoints, and the lines with the largest errors.
 
+mod corners;
 mod extent;
 mod operations;
 mod setpoints;
 mod survey;
 mod worst_lines;
 
+pub use corners::BoundedCorners;
 pub use operations::{
     LineEnergy, OperationFigures, OperationSummary, ProgramEnergy, ProgramTimes, ToolFigures,
 };

@@ -12,6 +12,7 @@ use virtual_axes_core::trajectory::PathPlace;
 use virtual_axes_core::trial::{GridSource, SourceError};
 use virtual_axes_core::units::{Nanoseconds, seconds};
 
+use super::corners::BoundedCorners;
 use super::operations::comment_lines;
 use crate::builtin::{ProgramReader, open_program, program_folder};
 use crate::interpret::{
@@ -143,6 +144,8 @@ pub struct ProgramTrack {
     pub stop: Option<usize>,
     /// First line of a motion with a tolerance of merged lines (G64 Q), which has no effect.
     pub merge_tolerance: Option<usize>,
+    /// Corners that short lines bound, and not the tolerance.
+    pub corners: BoundedCorners,
 }
 
 impl ProgramTrack {
@@ -158,7 +161,9 @@ impl ProgramTrack {
         let stop = self.stop.map(|line| (line, "M0 and M1 stop the axes and do not wait".to_owned()));
         let merging = "G64 Q has no effect: short lines are joined within P".to_owned();
         let merging = self.merge_tolerance.map(|line| (line, merging));
-        let mut notes: Vec<_> = dialect.chain(codes).chain(assumptions).chain(stop).chain(merging).collect();
+        let corners = self.corners.note();
+        let mut notes: Vec<_> =
+            dialect.chain(codes).chain(assumptions).chain(stop).chain(merging).chain(corners).collect();
         notes.sort_by_key(|(line, _)| *line);
         notes
     }
@@ -185,6 +190,9 @@ impl Iterator for NotedSteps<'_> {
         }
         match &step {
             Some(Ok(ProgramStep::Motion(motion))) => {
+                if !self.merges {
+                    track.corners.add(motion);
+                }
                 if let PathControl::Blend(Blend { merge_tolerance: Some(_), .. }) = motion.path_control
                     && !self.merges
                 {

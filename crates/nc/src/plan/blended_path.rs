@@ -78,6 +78,14 @@ fn uniform_weights(x: f64) -> [f64; 4] {
     [other / 6.0, 2.0 / 3.0 - x * x * (1.0 - 0.5 * x), 2.0 / 3.0 - y * y * (1.0 - 0.5 * y), cube / 6.0]
 }
 
+/// Returns the distance at which a corner of two lines is passed, m, if the `shorter` one bounds it and not the tolerance.
+/// `turn` is the norm of the difference of the directions.
+pub(crate) fn bounded_corner(tolerance: f64, turn: f64, shorter: f64) -> Option<f64> {
+    let wanted = (6.0 * tolerance / turn).min(TOLERANCE_DISTANCE * tolerance).min(WIDEST_DISTANCE);
+    let bound = CORNER_FRACTION * shorter;
+    (bound < wanted).then_some(turn * bound / 6.0)
+}
+
 impl BlendedPath {
     /// Creates a blended path that starts at `origin`, with a largest knot distance.
     pub fn new(origin: f64, largest: f64) -> Self {

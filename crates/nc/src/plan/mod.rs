@@ -38,6 +38,7 @@ mod vector;
 mod window;
 
 pub use activity::{ProgramActivity, TimeKind};
+pub(crate) use blended_path::bounded_corner;
 pub use chunk::PlannedChunk;
 pub use error::{FeedPlanError, StepError};
 pub use planner::{PartProgramPlanner, PlanOptions, PlannedSetpoint};

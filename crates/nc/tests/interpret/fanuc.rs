@@ -2,7 +2,7 @@
 
 use virtual_axes_core::config::{MachineConfig, Parameters};
 use virtual_axes_nc::interpret::{Dialect, InterpreterOptions, TipTransform, Tool};
-use virtual_axes_nc::motion::{MotionKind, ProgramEvent, ProgramMotion};
+use virtual_axes_nc::motion::{Feed, MotionKind, ProgramEvent, ProgramMotion};
 
 use crate::common::{events, millimeters, motions, steps};
 
@@ -349,6 +349,10 @@ fn alarms_and_missing_lines_are_rejected() {
         ("O1\nGOTO 5\n", "part.nc:2: N5: no such line in the program that runs"),
         ("O1\nWHILE[1EQ0]DO2\n", "part.nc:2: WHILE DO2 without END2"),
         ("O1\nEND1\n", "part.nc:2: END1 without DO1"),
+        (
+            "O1\nWHILE[#1 LT 3]DO1 #1=#1+1\nG0 X1.\nEND1\n",
+            "part.nc:2: #1=#1+1: a line ends after DO1: move the rest to a line of its own",
+        ),
         ("O1\nG65 A1.\n", "part.nc:2: G65 requires P, the number of the macro"),
         ("O1\nG70 I5. L4\n", "part.nc:2: G70 requires a canned cycle"),
         ("O1\nG81 Z-1. R1. F100. L0\nG71 I5. L4\n", "part.nc:3: G71 requires K, the angle between the holes"),
@@ -473,11 +477,17 @@ fn the_forms_of_tilted_planes_agree() {
         ("G68.2 P3 Q1 X5. Y-3. Z2. I1. J0 K0\nG68.2 P3 Q2 I0 J-0.5 K0.8660254037844386", about_x(point)),
         ("G68.2 P4 X5. Y-3. Z2. I0 J30. K0", about_x(point)),
         ("G68.2 P4 X5. Y-3. Z2. I30. J0 K30.", about_y(about_z(point))),
+        ("G268 X5. Y-3. Z2. I30. J30. K30. Q123", about_z(about_y(about_x(point)))),
+        ("G268 X5. Y-3. Z2. I30. J30. K30.", about_x(about_y(about_z(point)))),
     ] {
+        let (dialect, turn, end) = match lines.starts_with("G268") {
+            true => (Dialect::Haas, "G253", "G269"),
+            false => (Dialect::Fanuc, "G53.1", "G69"),
+        };
         let mut options =
-            InterpreterOptions { dialect: Some(Dialect::Fanuc), ..InterpreterOptions::for_machine(&machine) };
+            InterpreterOptions { dialect: Some(dialect), ..InterpreterOptions::for_machine(&machine) };
         options.tools.insert(2, Tool { length: 0.04, ..Tool::default() });
-        let text = format!("O1\nG21 G90 G54\n{lines}\nG53.1\nG43 H2 Z40.\nG1 X8. Y6. F500.\nG69\nM30\n");
+        let text = format!("O1\nG21 G90 G54\n{lines}\n{turn}\nG43 H2 Z40.\nG1 X8. Y6. F500.\n{end}\nM30\n");
         let found = motions(&text, options);
         let tip = millimeters(&transform.tip_of(&found.last().expect("a motion").end, 0.04));
         let workpiece = machine.kinematics().workpiece;
@@ -500,4 +510,26 @@ fn probing_moves_to_its_end() {
     assert_ends(Dialect::Fanuc, "O1\nG65 P9810 X3.\nM30\nO9810\nG0 Y#24\nM99\n", &[[0.0, 3.0, 0.0]]);
     let text = "G38.2 Z-2 F50\nG0 X#5063\nG38.5 Z0\n";
     assert_ends(Dialect::LinuxCnc, text, &[[0.0, 0.0, -2.0], [-2.0, 0.0, -2.0], [-2.0, 0.0, 0.0]]);
+}
+
+#[test]
+fn variables_of_the_memory_are_vacant_until_set() {
+    let text = "O1\nG0 X1. Y1.\nIF[#900038EQ#0]THEN#900038=3.\nIF[#98000EQ#0]THEN#999999=4.\nX#900038 Y#500001\nY[#999999*2.].\n\
+                G1 X5. F[#900038*20.].\nM30\n";
+    assert_ends(Dialect::Fanuc, text, &[[1.0, 1.0, 0.0], [3.0, 1.0, 0.0], [3.0, 8.0, 0.0], [5.0, 8.0, 0.0]]);
+    let motions = motions(text, options(Dialect::Fanuc));
+    let feed = motions.last().map(|motion| motion.feed);
+    assert!(matches!(feed, Some(Feed::Linear(feed)) if (feed - 0.001).abs() < 1e-12), "60 mm/min: {feed:?}");
+}
+
+#[test]
+fn codes_that_end_what_is_not_active_have_no_effect() {
+    let text = "O1\nG0 G17 G40 G13.1 G50.2 G25\nG54.2 P0\nG54.4 P0\nG05.4 Q0\nG113\nX2. Y3.\nM30\n";
+    assert_ends(Dialect::Fanuc, text, &[[2.0, 3.0, 0.0]]);
+    for (line, remedy) in
+        [("G54.2 P1", "dynamic fixture offset"), ("G60 X1.", "program G0"), ("G12.1", "polar")]
+    {
+        let found = steps(&format!("O1\n{line}\nM30\n"), options(Dialect::Fanuc)).map(|_| ());
+        assert!(found.as_ref().is_err_and(|error| error.to_string().contains(remedy)), "{line}: {found:?}");
+    }
 }

@@ -1,9 +1,9 @@
 //! Programs in the manner of grbl and Mach3, comments and other texts of each control, and their detection.
 
 use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions};
-use virtual_axes_nc::motion::{MotionKind, ProgramStep};
+use virtual_axes_nc::motion::{MotionKind, ProgramEvent, ProgramStep};
 
-use crate::common::{millimeters, motions};
+use crate::common::{events, millimeters, motions};
 
 /// Returns the detected dialect, and the ends of the motions, mm.
 fn detected(text: &str) -> (Dialect, Vec<[f64; 3]>) {
@@ -59,6 +59,26 @@ fn programs_run_in_their_detected_dialects() {
         let end = ends.last().expect("a motion");
         assert!(end.iter().zip(last).all(|(found, last)| (found - last).abs() < 1e-9), "{text}: {end:?}");
     }
+}
+
+#[test]
+fn lines_of_firmware_are_texts_and_commands() {
+    let text = "% post\nG21 G90\nM84 S0\n% vfd enable\nG0 X1\n%( start )\nM117 2D Pocket, X5\nM0 Put tool 1\nG0 X2\nM400\n?\nG28 Z\n\
+                G0 X3 Y1\n%\nG0 X99\n";
+    let (found, ends) = detected(text);
+    assert_eq!(found, Dialect::Grbl);
+    assert_eq!(ends.iter().map(|end| end[0]).collect::<Vec<_>>(), [1.0, 2.0, 3.0]);
+    let texts = events(text, InterpreterOptions::default());
+    let texts: Vec<_> = texts
+        .iter()
+        .filter_map(|(line, event)| match event {
+            ProgramEvent::Message(text) => Some((*line, text.as_str())),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(texts, [(7, "2D Pocket, X5"), (8, "Put tool 1")]);
+    let stops = events(text, InterpreterOptions::default());
+    assert_eq!(stops.iter().filter(|(_, event)| *event == ProgramEvent::Stop).count(), 1);
 }
 
 #[test]

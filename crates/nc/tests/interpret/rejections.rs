@@ -61,7 +61,6 @@ fn invalid_words_are_rejected_with_their_line() {
         ("G10 L20 P1", "part.nc:1: G10 L20 requires at least one axis word"),
         ("O1 if [0]\nO1 elseif [1] X5\nO1 endif", "part.nc:2: O1 elseif: X5: an expression in brackets"),
         ("O1 if [0]\nO1 else X5\nO1 endif", "part.nc:2: O1 else: X5: an expression in brackets"),
-        ("G1 X1 F100\n%X50", "part.nc:2: % encloses the program and is alone on its line"),
         ("G43.4 H1", "part.nc:1: G43.4 requires a machine with kinematics; program G43"),
         ("G43.1 X1", "part.nc:1: G43.1: only Z is supported"),
         ("G5.3", "part.nc:1: G5.3 without G5.2"),

@@ -51,7 +51,8 @@ fn a_single_error_is_one_line_and_several_are_a_page() {
         one,
         "part.nc:2: word Q has no effect in this line with G1: remove it, or program the code that it belongs to"
     );
-    let many = page(&folder, "G16\nG0 X1 B5\nG16\nM200\nM2\n", &options).expect("errors");
+    let linuxcnc = PartProgramOptions { dialect: Some(Dialect::LinuxCnc), ..PartProgramOptions::default() };
+    let many = page(&folder, "G16\nG0 X1 B5\nG16\nM200\nM2\n", &linuxcnc).expect("errors");
     let lines: Vec<&str> = many.lines().collect();
     assert_eq!(lines[0], "part.nc: 3 errors, read in the dialect linuxcnc");
     assert!(

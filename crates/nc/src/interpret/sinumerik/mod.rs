@@ -173,10 +173,16 @@ impl Sinumerik {
     ) -> Outcome<()> {
         if head(&block.raw).is_some() {
             // The head of the program itself stands at its start; another one ends it.
-            return if self.has_statement { self.end_unit(state, lines) } else { Ok(()) };
+            let is_entry = self.calls.last().is_some_and(|call| call.is_entry(self.place));
+            if is_entry || !self.has_statement {
+                self.move_entry(lines.place());
+                return Ok(());
+            }
+            return self.end_unit(state, lines);
         }
         block.read()?;
         if block.text.is_empty() || (block.skip_level.is_some() && state.options.skips_optional_lines) {
+            self.move_entry(lines.place());
             return Ok(());
         }
         self.macros.expand(&mut block.text)?;
@@ -185,6 +191,16 @@ impl Sinumerik {
         block.text = text;
         self.has_statement = true;
         result
+    }
+
+    /// Moves the start of the subprogram behind its present line, if that is the first one: PROC may follow comments.
+    fn move_entry(&mut self, next: Place) {
+        if let Some(call) = self.calls.last_mut()
+            && call.is_entry(self.place)
+            && !call.is_section()
+        {
+            call.entry = next;
+        }
     }
 
     /// Returns from a subprogram at its end, or ends the program.

@@ -21,6 +21,12 @@ const ADDRESSES: [&str; 37] = [
     "LEAD", "TILT", "THETA", "A6", "B6", "C6",
 ];
 
+/// Returns true for a letter with digits, which is no name of a subprogram: `M30`, not `L30`.
+fn is_address(name: &str) -> bool {
+    let digits = name.get(1..).unwrap_or_default();
+    !name.starts_with('L') && !digits.is_empty() && digits.bytes().all(|digit| digit.is_ascii_digit())
+}
+
 impl Sinumerik {
     /// Executes a block.
     pub(super) fn execute_block(
@@ -132,7 +138,8 @@ impl Sinumerik {
                 self.assignment(scanner, &mut words, state)?;
                 continue;
             }
-            if follows != Some(b'(') && words.read_letter(scanner)? {
+            // A remark may follow a word: `M0 (CHECK)`.
+            if (follows != Some(b'(') || is_address(name)) && words.read_letter(scanner)? {
                 continue;
             }
             scanner.advance(name.len());

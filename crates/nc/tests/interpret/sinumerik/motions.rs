@@ -221,3 +221,9 @@ fn blocks_of_posts_keep_their_geometry() {
     assert_eq!(x_ends("N10G0X5Y5\n/N20 G0 X99\nN30 G1X-2.5F200.\n:40 X 7"), [5.0, 99.0, -2.5, 7.0]);
     assert_ends("G1 F100 ANG=45 X10", &[[10.0, 10.0, 0.0]]);
 }
+
+#[test]
+fn remarks_in_parentheses_follow_words() {
+    let text = "N1 R1=5 (COUNT)\nN2 G0 X5 (START)\nN3 M0 (CHECK THE TOOL)\nN4 G1 X7 F600 (SLOW)\nN5 X8(LAST)\nN6 M30 (END)\n";
+    assert_eq!(x_ends(text), [5.0, 7.0, 8.0]);
+}

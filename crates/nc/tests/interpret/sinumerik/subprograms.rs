@@ -31,6 +31,23 @@ fn subprograms_of_the_file_take_values() {
 }
 
 #[test]
+fn a_procedure_follows_its_comments() {
+    let folder = Folder::new(
+        "proc_comment",
+        &[
+            ("CUBE.SPF", "; cube of a value\n; ------\n\nPROC CUBE(VAR REAL P_)\nP_=P_*P_*P_\nRET\n"),
+            ("TWICE.SPF", "%_N_TWICE_SPF\n;$PATH=/_N_SPF_DIR\nPROC TWICE(VAR REAL P_)\nP_=P_*2\nRET\n"),
+        ],
+    );
+    let text = "DEF REAL V_=3\nEXTERN CUBE(VAR REAL)\nG0 X1\nFOR R1=1 TO 2\nCUBE(V_)\nTWICE(V_)\nX=V_\nV_=2\nENDFOR\nM30";
+    let mut options = options();
+    options.subprogram_folder = Some(folder.0.clone());
+    let ends = motions(text, options);
+    let x: Vec<_> = ends.iter().map(|motion| (motion.end[0] * 1e3).round()).collect();
+    assert_eq!(x, [1.0, 54.0, 16.0]);
+}
+
+#[test]
 fn save_restores_modes_and_the_end_of_a_file_returns() {
     let text = "G0 G90 X1\nINNER\nX2\nM30\nPROC INNER SAVE DISPLOF\nG91 X5\nTRANS X100\nRET";
     assert_eq!(x_ends(text), [1.0, 6.0, 2.0]);
