@@ -17,7 +17,7 @@ use std::process::ExitCode;
 
 use virtual_axes::ros::{ROSOUT_QUEUE, log, node};
 use virtual_axes::validation::args::{ArgsError, Command, ParameterSource, RosArgs};
-use virtual_axes_core::config::{Parameters, ValueSource, parse_assignment};
+use virtual_axes_core::config::{Parameters, TimeMode, ValueSource, parse_assignment};
 use virtual_axes_dds::{Environment, Security};
 
 /// Global allocator.
@@ -124,6 +124,7 @@ fn parameters(args: &RosArgs) -> Result<Parameters, Box<dyn std::error::Error>> 
     let mut parameters = Parameters::embedded_default()?;
     let node = args.node().to_string();
     let mut pending = Vec::new();
+    let mut follows_clock = false;
     for source in args.parameters() {
         match source {
             ParameterSource::Value { name, text, .. } => {
@@ -132,6 +133,10 @@ fn parameters(args: &RosArgs) -> Result<Parameters, Box<dyn std::error::Error>> 
                         "-p machine:={text} sets the name only and changes no drive; to simulate another machine, \
                          pass its file with --params-file (`virtual_axes machines --show NAME` prints a built-in one)"
                     );
+                }
+                // Not set, as in a parameter file.
+                if matches!(text.trim(), "null" | "Null" | "NULL" | "~") {
+                    continue;
                 }
                 let assignment = parse_assignment(&format!("{name}:={text}"), &ValueSource::named("-p"))?;
                 match parameters.ignored(&assignment) {
@@ -142,19 +147,30 @@ fn parameters(args: &RosArgs) -> Result<Parameters, Box<dyn std::error::Error>> 
             ParameterSource::File(path) => {
                 parameters.set_all(std::mem::take(&mut pending))?;
                 let overlay = parameters.overlay_file(path, Some(&node))?;
+                follows_clock |= parameters.node_config().use_sim_time;
                 for reason in overlay.ignored {
                     tracing::warn!("{reason}; ignored");
                 }
+                for reason in overlay.repeated {
+                    tracing::warn!("{reason}; the last value applies");
+                }
                 if overlay.sections == 0 {
-                    tracing::warn!(
-                        "{} contains no parameters for {node}, only for {}; -r __node:=NAME changes the name of the node",
-                        path.display(),
-                        overlay.skipped.join(", ")
-                    );
+                    let file = path.display();
+                    match overlay.skipped.join(", ").as_str() {
+                        "" => tracing::warn!("{file} contains no parameters"),
+                        others => tracing::warn!(
+                            "{file} contains no parameters for {node}, only for {others}; -r __node:=NAME changes the \
+                             name of the node"
+                        ),
+                    }
                 }
             }
         }
     }
     parameters.set_all(pending)?;
+    let config = parameters.node_config();
+    if follows_clock && !config.use_sim_time && config.time == TimeMode::Fast {
+        tracing::warn!("use_sim_time = true of a parameter file is ignored: time = fast publishes /clock");
+    }
     Ok(parameters)
 }
