@@ -87,7 +87,7 @@ impl FileFilter<'_> {
         let present = self.entries.get("time").map(|entry| &entry.value);
         let time = assignments.iter().rev().find(|one| one.key == "time").map(|one| &one.value);
         let is_fast = time.or(present) == Some(&Value::Text("fast".to_owned()));
-        let mut groups = HashSet::new();
+        let mut named = HashSet::new();
         assignments.retain(|one| {
             let Assignment { key, value, source } = one;
             let follows_clock = key == "use_sim_time" && value.flag() == Some(true);
@@ -105,7 +105,8 @@ impl FileFilter<'_> {
                 })
             };
             let Some(reason) = reason else { return true };
-            if controller::find(key).is_none_or(|found| !found.is_group() || groups.insert(found.key)) {
+            let group = controller::find(key).filter(|found| found.is_group()).map(|found| found.key);
+            if named.insert(group.unwrap_or(key).to_owned()) {
                 ignored.push(reason);
             }
             false

@@ -179,7 +179,12 @@ impl Parameters {
             sections: file.matched,
             skipped: file.skipped,
             ignored: ignored.iter().map(ToString::to_string).collect(),
-            repeated: file.repeated.iter().map(|(_, error)| error.to_string()).collect(),
+            repeated: file
+                .repeated
+                .iter()
+                .filter(|(key, _)| assignments.iter().any(|one| one.key == *key))
+                .map(|(_, error)| error.to_string())
+                .collect(),
         };
         let mut base = self.entries.clone();
         if report.is_machine_replaced {

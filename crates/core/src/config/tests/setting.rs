@@ -336,8 +336,6 @@ mill:
         warnings,
         [
             "site.yaml:3: unknown parameter cell",
-            "site.yaml:5: unknown parameter cell",
-            "site.yaml:5: duplicate parameter cell, first set at site.yaml:3",
             "site.yaml:6: duplicate parameter x.velocity_loop.gain, first set at site.yaml:4",
         ]
     );
