@@ -187,6 +187,26 @@ def test_wrong_arguments_are_rejected_by_name(arguments: list[str], words: list[
     assert [word for word in words if word not in text] == [], text
 
 
+def test_arguments_are_escaped_and_shortened_in_errors():
+    """A line end, a control sequence, and thousands of characters."""
+    long = "n" * 5000
+    for arguments in (
+        ["a\nb\x1b[31m"],
+        ["--params-file", "a\nb\x1b[31m"],
+        ["-p", "a\nb\x1b[31m:=1"],
+        ["--log-level", long],
+    ):
+        text = rejection(*arguments)
+        assert text.count("\n") == 1 and "\x1b" not in text and len(text) < 1200, text
+        assert long in arguments or "a\\nb\\u{1b}[31m" in text, text
+
+
+def test_help_that_cannot_be_printed_is_an_error():
+    with Path("/dev/full").open("w") as full:
+        status = subprocess.run([str(node_binary()), "--help"], stdout=full, stderr=subprocess.PIPE, check=False)
+    assert status.returncode == 2 and b"standard output: No space left" in status.stderr
+
+
 def test_a_wrong_domain_is_rejected():
     """The environment is validated like an argument."""
     status = subprocess.run(

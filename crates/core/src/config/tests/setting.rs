@@ -293,7 +293,7 @@ mill:
         let reason = ignored(&format!("{foreign}:=1"));
         assert!(reason.is_some_and(|reason| reason.starts_with(&format!("-p: unknown parameter {foreign}"))));
     }
-    for slip in ["x.gian", "publsh_rate", "velocity_loop.gain", "use_sim_tiem"] {
+    for slip in ["publsh_rate", "velocity_loop.gain", "use_sim_tiem"] {
         assert_eq!(ignored(&format!("{slip}:=1")), None, "{slip}");
     }
     assert!(ignored("start_type_description_service:=false").is_some());
@@ -346,7 +346,7 @@ mill:
 
 #[test]
 fn files_of_other_nodes_that_ros_reads_are_accepted() {
-    for text in ["", "# nothing\n", "---\n", "{}\n"] {
+    for text in ["", "# nothing\n", "---\n"] {
         assert_eq!(overlaid(text), Ok((mikron(), Vec::new())), "{text}");
         assert!(Parameters::from_yaml(text, "my.yaml").is_err());
     }
