@@ -80,9 +80,9 @@ def test_parameters_of_other_nodes_are_ignored(start: Callable[..., AxesClient],
             ["duplicate parameter x.velocity_loop.gain"],
         ),
         (
-            "/**:\n  ros__parameters: {arr: [1, two], machine: vmc_3, joints: [elbow], use_sim_time: no, cell: ~}\n",
+            "/**:\n  ros__parameters: {arr: [1, two], joints: [elbow], use_sim_time: no, cell: ~}\n",
             3.0,
-            ["arr: found a list", "machine = vmc_3", "joints = [elbow]"],
+            ["arr: found a list", "joints = [elbow]"],
         ),
         ("/**:\n  ros__parameters: {use_sim_time: true}\n", 3.0, ["use_sim_time = true"]),
         (
