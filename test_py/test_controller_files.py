@@ -41,6 +41,33 @@ WARNINGS = {
         + ["speed_scaling.initial_scaling_factor", "constraints.pan.trajectory", "constraints.pan.goal"],
     ),
     "swivel_table": ("swivel_table", []),
+    "delta_slides": (
+        "delta_controller",
+        [*OTHER_ROBOT, "command_joints", "allow_integration_in_goal_trajectories", "constraints.slide_1.goal"],
+    ),
+    "base_with_boom": ("/site/boom_controller", ["joints", "constraints.turret.goal"]),
+    "driven_base": (
+        "base_controller",
+        ["left_wheel_names", "right_wheel_names", "wheel_separation", "pose_covariance_diagonal", "open_loop"],
+    ),
+    "lathe_loader": ("loader", ["state_publish_rate", "angle_wraparound.x"]),
+    "upper_body": (
+        "upper_body_controller",
+        [*OTHER_ROBOT, "state_interfaces", "gains.l_shoulder.p", "speed_scaling.topic", "speed_scaling_topic_name"]
+        + ["default_acceleration_limit", "constraints.l_elbow.goal"],
+    ),
+    "wrong_types": (
+        "loose_controller",
+        [*OTHER_ROBOT, "state_interfaces", "action_monitor_rate", "interpolation_method", "cmd_timeout"]
+        + ["allow_nonzero_velocity_at_trajectory_end", "constraints.goal_time", "constraints.x.goal"],
+    ),
+    "unset_values": ("commented_controller", []),
+    "mirrored_gantry": ("gantry_controller", ["joints", "mimic.x2", "homing.order", "homing.speed"]),
+    "all_defaults": (
+        "tilt_controller",
+        ["state_interfaces", "allow_partial_joints_goal", "interpolate_from_desired_state", "open_loop_control"]
+        + ["thread_priority", "async_parameters.cpu_affinity", "gains.c.p"],
+    ),
 }
 """Node name of each file and the keys that it warns of, each once; the first key of gains stands for all."""
 PRESENT = {
@@ -48,6 +75,11 @@ PRESENT = {
     "twin_gantry": (list("xyzac"), {"constraints.x.trajectory": 0.05, "action_monitor_rate": 20.0}),
     "six_axis_arm": (list("xyzac"), {"goal_time_tolerance": 0.8, "action_monitor_rate": 25.0}),
     "swivel_table": (["a", "c"], {"constraints.cell_c.goal": 0.004}),
+    "driven_base": (list("xyzac"), {"publish_rate": 50.0}),
+    "lathe_loader": (["x", "y", "z"], {"constraints.x.goal": 0.001, "goal_time_tolerance": 1.0}),
+    "unset_values": (["x", "y"], {"goal_time_tolerance": 0.0}),
+    "mirrored_gantry": (list("xyzac"), {"constraints.z.goal": 0.0005, "goal_time_tolerance": 2.0}),
+    "all_defaults": (["c", "a"], {"constraints.a.goal": 0.1}),
 }
 """Joints and parameters with a file."""
 
@@ -58,13 +90,13 @@ def test_the_node_runs_with_the_file_of_a_controller(start: Callable[..., AxesCl
     namespace, _, base = name.rpartition("/")
     names = ["-r", f"__node:={base}", "-r", f"__ns:={namespace or '/'}"]
     drive = start(*names, "--params-file", str(FOLDER / f"{file}.yaml"), name=f"{namespace}/{base}")
-    ignored = rf"{file}.yaml:\d+: (?:unknown parameter )?([\w.]+)(?: .*)?; (?:.*; )?ignored$"
+    ignored = rf"{file}.yaml:\d+: (?:unknown parameter )?([\w.]+)(?::? .*)?; (?:.*; )?ignored$"
     found = re.findall(ignored, drive.process.output(), re.MULTILINE)
     assert sorted(found) == sorted(keys), drive.process.output()
     joints, parameters = PRESENT.get(file, (list("xyzac"), {}))
     if file != "swivel_table":
         assert drive.get_parameters(["joints", *parameters]) == {"joints": joints} | parameters
-        drive.run(joint_trajectory(["x"], [0.0, 0.5], [[0.0], [0.002]]))
+        drive.run(joint_trajectory([joints[0]], [0.0, 0.5], [[0.0], [0.002]]))
 
 
 def test_a_slip_in_a_file_of_this_node_is_rejected(tmp_path: Path) -> None:

@@ -64,6 +64,52 @@ def test_parameters_of_other_nodes_are_ignored(start: Callable[..., AxesClient],
     assert "unknown parameter cell_name" in rejection("--params-file", str(shared))
 
 
+@pytest.mark.parametrize(
+    ("text", "gain", "warnings"),
+    [
+        ("", 3.0, ["contains no parameters"]),
+        (
+            "/**: {ros__parameters: {cell: 1}}\n/**: {ros__parameters: {x.velocity_loop.gain: 4.0}}\n",
+            4.0,
+            ["parameter cell;"],
+        ),
+        ("\ufeff/**:\r\n  ros__parameters:\r\n    x.velocity_loop.gain: 4.0\r\n", 4.0, []),
+        (
+            "/**:\n  ros__parameters:\n    x.velocity_loop.gain: 5.0\n    x: {velocity_loop: {gain: 4.0}}\n",
+            4.0,
+            ["duplicate parameter x.velocity_loop.gain"],
+        ),
+        (
+            "/**:\n  ros__parameters: {arr: [1, two], joints: [elbow], use_sim_time: no, cell: ~}\n",
+            3.0,
+            ["arr: found a list", "joints = [elbow]"],
+        ),
+        ("/**:\n  ros__parameters: {use_sim_time: true}\n", 3.0, ["use_sim_time = true"]),
+        (
+            "/*:\n  virtual_axes:\n    ros__parameters: {x.velocity_loop.gain: 5.0}\n"
+            "/**/virtual_axes:\n  ros__parameters: &own {x.velocity_loop.gain: 4.0}\n"
+            "other:\n  ros__parameters: *own\n",
+            4.0,
+            [],
+        ),
+    ],
+    ids=["empty", "two_sections", "bom_crlf", "nested_twice", "values_of_others", "clock", "patterns"],
+)
+def test_files_that_ros_reads_are_accepted(
+    start: Callable[..., AxesClient], tmp_path: Path, text: str, gain: float, warnings: list[str]
+):
+    """A node in `fast`, which publishes the clock, with files that were written for all nodes."""
+    shared = tmp_path / "shared.yaml"
+    shared.write_bytes(text.encode())
+    names = ["-p", "cell_name:=hall", "-p", "gain:=2", "-p", "frame_id:=base", "-p", "publish_rate:=null"]
+    drive = start("-p", "x.velocity_loop.gain:=3.0", "--params-file", str(shared), "-p", "time:=fast", *names)
+    assert drive.get_parameters(["x.velocity_loop.gain"]) == {"x.velocity_loop.gain": gain}
+    found = [line for line in drive.process.output().splitlines() if "WARN" in line]
+    for word in [*warnings, "cell_name", "unknown parameter gain", "frame_id"]:
+        assert len([line for line in found if word in line]) == 1, (word, found)
+    assert len(found) == len(warnings) + 3, found
+
+
 def test_the_linear_motor_machine_moves(start: Callable[..., AxesClient]):
     """Another machine file: other drives, another position cycle."""
     file = CONFIG / "linear_motor_center.yaml"
@@ -139,6 +185,26 @@ def test_wrong_arguments_are_rejected_by_name(arguments: list[str], words: list[
     """One message that names the wrong input, and status 2."""
     text = rejection(*arguments)
     assert [word for word in words if word not in text] == [], text
+
+
+def test_arguments_are_escaped_and_shortened_in_errors():
+    """A line end, a control sequence, and thousands of characters."""
+    long = "n" * 5000
+    for arguments in (
+        ["a\nb\x1b[31m"],
+        ["--params-file", "a\nb\x1b[31m"],
+        ["-p", "a\nb\x1b[31m:=1"],
+        ["--log-level", long],
+    ):
+        text = rejection(*arguments)
+        assert text.count("\n") == 1 and "\x1b" not in text and len(text) < 1200, text
+        assert long in arguments or "a\\nb\\u{1b}[31m" in text, text
+
+
+def test_help_that_cannot_be_printed_is_an_error():
+    with Path("/dev/full").open("w") as full:
+        status = subprocess.run([str(node_binary()), "--help"], stdout=full, stderr=subprocess.PIPE, check=False)
+    assert status.returncode == 2 and b"standard output: No space left" in status.stderr
 
 
 def test_a_wrong_domain_is_rejected():

@@ -68,6 +68,19 @@ def test_a_static_peer_of_one_side_replaces_multicast(side: str):
         assert watched["missing"] == 0 and watched["received"] > 100
 
 
+def test_a_static_peer_without_address_causes_a_warning():
+    """A list with the separator of other systems, and an address of IPv6."""
+    peers = ["192.0.2.1,192.0.2.2", "::1"]
+    with Link() as link, node_behind(link, ROS_STATIC_PEERS=";".join([*peers, CLIENT_ADDRESS])) as node:
+        end = time.monotonic() + 20.0
+        while node.output().count("has no IPv4 address") < len(peers):
+            assert time.monotonic() < end, node.output()
+            time.sleep(0.1)
+        for peer in peers:
+            assert f"ROS_STATIC_PEERS: {peer} has no IPv4 address" in node.output()
+        assert f"{CLIENT_ADDRESS} has no" not in node.output()
+
+
 def test_samples_arrive_again_after_the_link_was_down():
     """The link is down for 30 s, longer than the lease of Fast DDS."""
     with (

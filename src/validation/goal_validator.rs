@@ -95,17 +95,19 @@ fn joint_tolerances(
             let text = format!("{field}[{index}], joint {}: {text}", tolerance.name);
             Rejection::new(RejectionCode::InvalidTolerance, text).joint(&tolerance.name)
         };
-        let is_named = |&joint: &usize| joints.get(joint).is_some_and(|j| j.name == tolerance.name);
-        let column = joint_indices.iter().position(is_named);
-        let Some(entry) = column.and_then(|column| list.get_mut(column)) else {
-            return Err(rejection("the trajectory does not contain this joint".to_owned()));
+        let Some(joint) = joints.iter().position(|joint| joint.name == tolerance.name) else {
+            let names: Vec<_> = joints.iter().map(|joint| joint.name.as_str()).collect();
+            return Err(rejection(format!("there is no such joint; joints = [{}]", names.join(", "))));
         };
+        // As joint_trajectory_controller: a joint that the trajectory does not name rests, within any tolerance.
+        let column = joint_indices.iter().position(|&index| index == joint);
+        let Some(entry) = column.and_then(|column| list.get_mut(column)) else { continue };
         if requested.iter().take(index).any(|earlier| earlier.name == tolerance.name) {
             return Err(rejection("the joint is given twice".to_owned()));
         }
         let limit = |quantity: &str, value: f64, default: Option<f64>| match value {
             0.0 => Ok(default),
-            DISABLED => Ok(None),
+            DISABLED | f64::INFINITY => Ok(None),
             value if value > 0.0 && value.is_finite() => Ok(Some(value)),
             value => {
                 let text = format!(
@@ -203,20 +205,29 @@ mod tests {
     #[test]
     fn invalid_tolerances_are_rejected_with_joint_and_value() {
         for (list, words) in [
-            (vec![entry("y", 0.1, 0.0)], "joint y: the trajectory does not contain"),
+            (vec![entry("q", 0.1, 0.0)], "joint q: there is no such joint; joints = [x, "),
             (
                 vec![entry("x", 0.1, 0.0), entry("x", 0.1, 0.0)],
                 "path_tolerance[1], joint x: the joint is given twice",
             ),
             (vec![entry("x", f64::NAN, 0.0)], "position is NaN"),
             (vec![entry("x", 0.0, -0.5)], "velocity is -0.5"),
-            (vec![entry("x", f64::INFINITY, 0.0)], "position is inf"),
+            (vec![entry("x", f64::NEG_INFINITY, 0.0)], "position is -inf"),
         ] {
             let goal = FollowJointTrajectoryGoal { path_tolerance: list, ..Default::default() };
             let rejection = found(&goal).expect_err("must be rejected");
             assert_eq!(rejection.code, RejectionCode::InvalidTolerance);
             assert!(rejection.text.contains(words), "{rejection}");
         }
+    }
+
+    #[test]
+    fn an_infinite_tolerance_is_none_and_one_of_another_joint_has_no_effect() {
+        let path_tolerance = vec![entry("y", 0.1, 0.0), entry("x", f64::INFINITY, 0.0)];
+        let other = FollowJointTrajectoryGoal { path_tolerance, ..Default::default() };
+        let goal =
+            FollowJointTrajectoryGoal { path_tolerance: vec![entry("x", -1.0, 0.0)], ..Default::default() };
+        assert_eq!(found(&other).expect("valid tolerances"), found(&goal).expect("valid tolerances"));
     }
 
     #[test]

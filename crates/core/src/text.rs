@@ -63,6 +63,12 @@ pub fn nearest_name<T: AsRef<str>>(found: &str, known: impl IntoIterator<Item = 
     similar.min_by_key(|name| damerau_levenshtein(&found, name))
 }
 
+/// Returns true if `found` differs from `name` in at most a third of its characters, or in one.
+pub fn is_slip(found: &str, name: &str) -> bool {
+    let found = shortened(found);
+    damerau_levenshtein(&found, name) <= (found.chars().count() / 3).max(1)
+}
+
 /// Returns the end of a message about an unknown name: `; the nearest is NAME`, or an empty text.
 pub fn nearest_hint(nearest: &Option<String>) -> String {
     nearest.as_ref().map_or_else(String::new, |name| format!("; the nearest is {name}"))
@@ -97,6 +103,17 @@ mod tests {
     fn control_characters_are_escaped() {
         assert_eq!(escaped("a\u{1b}[31m\n\u{202e}µ\\"), "a\\u{1b}[31m\\n\\u{202e}µ\\");
         assert_eq!(escaped_lines("a\n\u{7f}b\n"), "a\n\\u{7f}b\n");
+    }
+
+    #[test]
+    fn a_slip_changes_few_characters() {
+        for (found, name) in [("jonts", "joints"), ("tiem", "time"), ("publsh_rat", "publish_rate")] {
+            assert!(is_slip(found, name), "{found}");
+        }
+        for (found, name) in [("cell", "c.delays.alpha_ms"), ("true", "time"), ("arr", "part_program.tools")]
+        {
+            assert!(!is_slip(found, name), "{found}");
+        }
     }
 
     #[test]

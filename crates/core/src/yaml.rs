@@ -4,6 +4,7 @@
 use std::fmt;
 
 use serde::de::{Deserialize, DeserializeOwned, Deserializer, Visitor};
+use serde_saphyr::options::DuplicateKeyPolicy;
 use serde_saphyr::{Budget, Error, NonFiniteFloatPolicy, Options};
 
 use crate::text::{nearest_hint, nearest_name, shortened};
@@ -60,6 +61,16 @@ pub fn position(file: &str, line: u64) -> String {
 /// [`YamlError`] for invalid YAML, duplicate keys, and values that do not fit `T`.
 pub fn document<T: DeserializeOwned>(text: &str) -> Result<T, YamlError> {
     let options = options(Budget::default());
+    serde_saphyr::from_str_with_options(text, options).map_err(|error| YamlError::new(&error, text))
+}
+
+/// Reads a text with exactly one document, whose mappings may repeat keys: `T` receives each of them.
+///
+/// # Errors
+/// [`YamlError`] for invalid YAML, and values that do not fit `T`.
+pub fn document_with_repeated_keys<T: DeserializeOwned>(text: &str) -> Result<T, YamlError> {
+    let mut options = options(Budget::default());
+    options.duplicate_keys = DuplicateKeyPolicy::LastWins;
     serde_saphyr::from_str_with_options(text, options).map_err(|error| YamlError::new(&error, text))
 }
 

@@ -12,12 +12,13 @@ mod datagrams;
 mod epoll_wait;
 
 use std::ffi::OsString;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
 use virtual_axes::ros::{ROSOUT_QUEUE, log, node};
 use virtual_axes::validation::args::{ArgsError, Command, ParameterSource, RosArgs};
-use virtual_axes_core::config::{Parameters, ValueSource, parse_assignment};
+use virtual_axes_core::config::{Parameters, TimeMode, ValueSource, parse_assignment};
+use virtual_axes_core::text::escaped;
 use virtual_axes_dds::{Environment, Security};
 
 /// Global allocator.
@@ -27,6 +28,9 @@ use virtual_axes_dds::{Environment, Security};
 /// times what it uses.
 #[global_allocator]
 static ALLOCATOR: tikv_jemallocator::Jemalloc = tikv_jemallocator::Jemalloc;
+
+/// Number of characters of a long error that are shown from its start and from its end.
+const SHOWN_CHARACTERS: usize = 500;
 
 /// Exit status for an invalid command line, environment or machine file.
 const USAGE_ERROR: u8 = 2;
@@ -63,9 +67,13 @@ fn arguments() -> Result<Vec<String>, ArgsError> {
 }
 
 fn print_line(text: &str) -> ExitCode {
-    // A closed stdout is not an error.
-    let _ = writeln!(std::io::stdout(), "{text}");
-    ExitCode::SUCCESS
+    match writeln!(std::io::stdout(), "{text}") {
+        // A closed stdout is not an error.
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            fail(&std::io::Error::other(format!("standard output: {error}")))
+        }
+        _ => ExitCode::SUCCESS,
+    }
 }
 
 fn fail(error: &dyn std::error::Error) -> ExitCode {
@@ -78,8 +86,17 @@ fn variable(name: &str) -> Option<String> {
     std::env::var_os(name).map(|value| value.to_string_lossy().into_owned())
 }
 
+/// Returns the line of an error, with escaped control characters, and without the middle of a long one.
 fn error_line(error: &str) -> String {
-    format!("virtual_axes_node: {error}")
+    let shown = match error.chars().count() {
+        length if length > 2 * SHOWN_CHARACTERS => {
+            let start: String = error.chars().take(SHOWN_CHARACTERS).collect();
+            let end: String = error.chars().skip(length - SHOWN_CHARACTERS).collect();
+            format!("{start}…{end}")
+        }
+        _ => error.to_owned(),
+    };
+    format!("virtual_axes_node: {}", escaped(&shown))
 }
 
 fn run(args: &RosArgs) -> ExitCode {
@@ -124,6 +141,7 @@ fn parameters(args: &RosArgs) -> Result<Parameters, Box<dyn std::error::Error>> 
     let mut parameters = Parameters::embedded_default()?;
     let node = args.node().to_string();
     let mut pending = Vec::new();
+    let mut follows_clock = false;
     for source in args.parameters() {
         match source {
             ParameterSource::Value { name, text, .. } => {
@@ -132,6 +150,10 @@ fn parameters(args: &RosArgs) -> Result<Parameters, Box<dyn std::error::Error>> 
                         "-p machine:={text} sets the name only and changes no drive; to simulate another machine, \
                          pass its file with --params-file (`virtual_axes machines --show NAME` prints a built-in one)"
                     );
+                }
+                // Not set, as in a parameter file.
+                if matches!(text.trim(), "null" | "Null" | "NULL" | "~") {
+                    continue;
                 }
                 let assignment = parse_assignment(&format!("{name}:={text}"), &ValueSource::named("-p"))?;
                 match parameters.ignored(&assignment) {
@@ -142,19 +164,30 @@ fn parameters(args: &RosArgs) -> Result<Parameters, Box<dyn std::error::Error>> 
             ParameterSource::File(path) => {
                 parameters.set_all(std::mem::take(&mut pending))?;
                 let overlay = parameters.overlay_file(path, Some(&node))?;
+                follows_clock |= parameters.node_config().use_sim_time;
                 for reason in overlay.ignored {
                     tracing::warn!("{reason}; ignored");
                 }
+                for reason in overlay.repeated {
+                    tracing::warn!("{reason}; the last value applies");
+                }
                 if overlay.sections == 0 {
-                    tracing::warn!(
-                        "{} contains no parameters for {node}, only for {}; -r __node:=NAME changes the name of the node",
-                        path.display(),
-                        overlay.skipped.join(", ")
-                    );
+                    let file = path.display();
+                    match overlay.skipped.join(", ").as_str() {
+                        "" => tracing::warn!("{file} contains no parameters"),
+                        others => tracing::warn!(
+                            "{file} contains no parameters for {node}, only for {others}; -r __node:=NAME changes the \
+                             name of the node"
+                        ),
+                    }
                 }
             }
         }
     }
     parameters.set_all(pending)?;
+    let config = parameters.node_config();
+    if follows_clock && !config.use_sim_time && config.time == TimeMode::Fast {
+        tracing::warn!("use_sim_time = true of a parameter file is ignored: time = fast publishes /clock");
+    }
     Ok(parameters)
 }

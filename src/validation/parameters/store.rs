@@ -129,6 +129,11 @@ impl ParameterStore {
             let value = from_ros(value).ok_or_else(|| {
                 format!("{}: type is an empty list or byte array; neither is supported", shortened(&key))
             })?;
+            // In a file `yes` is a flag; here it is a text.
+            let is_flag = self.parameters.definition(&key).is_some_and(|d| d.kind == ParameterKind::Flag);
+            if let (true, Value::Text(text)) = (is_flag, &value) {
+                return Err(format!("{key}: found text \"{}\", expected true or false", shortened(text)));
+            }
             assignments.push(Assignment { key, value, source: source.clone() });
         }
         let mut changed = self.parameters.clone();
@@ -220,6 +225,14 @@ mod tests {
             let reason = store().check(vec![("k\n".repeat(100_000), value)]).map(|_| ()).unwrap_err();
             assert!(reason.len() < 1000 && !reason.contains('\n'), "{} bytes", reason.len());
         }
+    }
+
+    #[test]
+    fn a_text_is_no_flag() {
+        let set = |value| store().check(vec![("use_sim_time".to_owned(), value)]).map(|_| ());
+        let reason = set(ParameterValue::String("yes".to_owned())).unwrap_err();
+        assert_eq!(reason, "use_sim_time: found text \"yes\", expected true or false");
+        assert_eq!(set(ParameterValue::Bool(true)), Ok(()));
     }
 
     /// Each parameter requires a validation of the whole machine, which delays other requests.

@@ -54,7 +54,7 @@ const PARAMETERS: &[ControllerParameter] = &[
     },
     ControllerParameter {
         key: "allow_integration_in_goal_trajectories",
-        describes_node: |value| *value == Value::Bool(false),
+        describes_node: |value| value.flag() == Some(false),
         allowed: "be false: every point of a trajectory has positions",
     },
     ControllerParameter {
@@ -95,7 +95,7 @@ const PARAMETERS: &[ControllerParameter] = &[
     },
     ControllerParameter {
         key: "is_async",
-        describes_node: |value| *value == Value::Bool(false),
+        describes_node: |value| value.flag() == Some(false),
         allowed: "be omitted: the axes have a thread of their own",
     },
     ControllerParameter {
@@ -106,7 +106,7 @@ const PARAMETERS: &[ControllerParameter] = &[
 ];
 
 fn is_true(value: &Value) -> bool {
-    *value == Value::Bool(true)
+    value.flag() == Some(true)
 }
 
 fn is_text(value: &Value, text: &str) -> bool {

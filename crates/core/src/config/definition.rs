@@ -213,9 +213,10 @@ impl ParameterDefinition {
                     (min_len..=max_len).contains(&numbers.len()) && numbers.iter().all(|n| n.is_finite())
                 })
                 .map(Value::DoubleList),
-            (ParameterKind::Flag, Value::Bool(_))
-            | (ParameterKind::Text, Value::Text(_))
-            | (ParameterKind::TextList, Value::TextList(_)) => Some(value.clone()),
+            (ParameterKind::Flag, flag) if flag.flag().is_some() => flag.flag().map(Value::Bool),
+            (ParameterKind::Text, Value::Text(_)) | (ParameterKind::TextList, Value::TextList(_)) => {
+                Some(value.clone())
+            }
             _ => {
                 return Err(ConfigError::wrong_type(at, key, &value.described(), &self.expected_type()));
             }

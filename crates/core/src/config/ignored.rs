@@ -6,7 +6,7 @@ use std::collections::HashSet;
 use super::aliases;
 use super::controller;
 use super::declaration::Entries;
-use super::error::ConfigError;
+use super::error::{ConfigError, ValueSource};
 use super::layout::{ParameterLayout, is_rclcpp_parameter};
 use super::parameter_file::Assignment;
 use super::value::Value;
@@ -21,18 +21,49 @@ pub(super) struct FileFilter<'a> {
     pub shared: &'a HashSet<String>,
     /// True if the file is a complete machine.
     pub is_machine: bool,
+    /// True if the file has a section for a controller manager.
+    pub has_manager: bool,
 }
 
 impl FileFilter<'_> {
     /// Removes the ignored parameters from `assignments` and returns the reasons, one for each parameter or group of them.
     ///
-    /// A file with a parameter that only controllers have is the file of a controller. Its unknown parameters are ignored in
-    /// every section, since controllers ignore them, and so are its joints if this machine does not have all of them.
-    pub fn remove_ignored(&self, assignments: &mut Vec<Assignment>) -> Vec<ConfigError> {
-        let is_controller =
-            !self.is_machine && assignments.iter().any(|one| controller::find(&one.key).is_some());
-        let has_joints = assignments.iter().any(|one| one.key == "joints");
+    /// A file with a parameter that only controllers have, or for a controller manager, is the file of a controller. Its unknown parameters are ignored in
+    /// every section, since controllers ignore them, and so are its joints if this machine does not have all of them. In a
+    /// section for several nodes, `joints` without one of this machine and a single `machine` are those of another node.
+    ///
+    /// # Errors
+    /// That about the first key of `unusable` that is not ignored.
+    pub fn remove_ignored(
+        &self,
+        assignments: &mut Vec<Assignment>,
+        unusable: Vec<(String, ConfigError)>,
+    ) -> Result<Vec<ConfigError>, ConfigError> {
+        let has_parameter = || assignments.iter().any(|one| controller::find(&one.key).is_some());
+        let is_controller = !self.is_machine && (self.has_manager || has_parameter());
         let mut ignored = Vec::new();
+        if !self.is_machine && !is_controller {
+            assignments.retain(|one| {
+                let reason = self.foreign_machine(one);
+                let is_kept = reason.is_none();
+                ignored.extend(reason);
+                is_kept
+            });
+        }
+        let has_joints = assignments.iter().any(|one| one.key == "joints");
+        let unknown = |key: &str, source: &ValueSource| {
+            let is_for_others = !self.is_machine && !has_joints && self.shared.contains(key);
+            self.layout
+                .check_name(key, source)
+                .err()
+                .filter(|_| is_controller || is_for_others || is_rclcpp_parameter(key))
+        };
+        for (key, error) in unusable {
+            match unknown(&key, &ValueSource::named("")) {
+                Some(_) => ignored.push(error),
+                None => return Err(error),
+            }
+        }
         let mut joints: Vec<String> = self.layout.joints.iter().map(|joint| joint.name.clone()).collect();
         let prefix = assignments.iter().rev().find_map(|one| match &one.value {
             Value::Text(prefix) if one.key == "joint_prefix" => Some(prefix.clone()),
@@ -53,31 +84,48 @@ impl FileFilter<'_> {
                 true
             });
         }
-        let mut groups = HashSet::new();
+        let present = self.entries.get("time").map(|entry| &entry.value);
+        let time = assignments.iter().rev().find(|one| one.key == "time").map(|one| &one.value);
+        let is_fast = time.or(present) == Some(&Value::Text("fast".to_owned()));
+        let mut named = HashSet::new();
         assignments.retain(|one| {
             let Assignment { key, value, source } = one;
-            let reason = if let Some(parameter) = controller::find(key) {
+            let follows_clock = key == "use_sim_time" && value.flag() == Some(true);
+            let reason = if follows_clock && is_fast && self.shared.contains(key) {
+                let allowed = "be false for this node: time = fast publishes /clock";
+                Some(ConfigError::not_allowed(source, key, &value.rounded(), allowed))
+            } else if let Some(parameter) = controller::find(key) {
                 parameter.check(key, value, source).err()
             } else if aliases::is_alias(key) {
                 is_controller.then(|| self.constraint(one, &joints, &prefix).err()).flatten()
             } else {
-                let is_for_others = !self.is_machine && !has_joints && self.shared.contains(key);
-                let unknown = self.layout.check_name(key, source).err();
-                match unknown {
-                    Some(reason) => {
-                        (is_controller || is_for_others || is_rclcpp_parameter(key)).then_some(reason)
-                    }
-                    None if is_controller => self.layout.check_value(key, value, source).err(),
-                    None => None,
-                }
+                unknown(key, source).or_else(|| {
+                    let is_known = is_controller && self.layout.check_name(key, source).is_ok();
+                    is_known.then(|| self.layout.check_value(key, value, source).err()).flatten()
+                })
             };
             let Some(reason) = reason else { return true };
-            if controller::find(key).is_none_or(|found| !found.is_group() || groups.insert(found.key)) {
+            let group = controller::find(key).filter(|found| found.is_group()).map(|found| found.key);
+            if named.insert(group.unwrap_or(key).to_owned()) {
                 ignored.push(reason);
             }
             false
         });
-        ignored
+        Ok(ignored)
+    }
+
+    /// Returns the reason why `machine` or `joints` of a section for several nodes are those of another node, if they are.
+    fn foreign_machine(&self, one: &Assignment) -> Option<ConfigError> {
+        let is_joint = |name: &String| self.layout.joints.iter().any(|joint| joint.name == *name);
+        let is_foreign = match (one.key.as_str(), &one.value) {
+            ("machine", _) => true,
+            ("joints", Value::TextList(names)) => !names.iter().any(is_joint),
+            ("joints", _) => true,
+            _ => false,
+        };
+        let allowed = "be part of a complete machine, which a machine file describes";
+        (is_foreign && self.shared.contains(&one.key))
+            .then(|| ConfigError::not_allowed(&one.source, &one.key, &one.value.rounded(), allowed))
     }
 
     /// Returns the joints of a controller without their prefix, which also becomes the value.

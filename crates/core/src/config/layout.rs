@@ -7,7 +7,7 @@ use super::definition::{AxisKind, MotorKind, ParameterDefinition, Scope};
 use super::error::{ConfigError, ValueSource};
 use super::schema::DEFINITIONS;
 use super::value::Value;
-use crate::text::{nearest_hint, nearest_name, shortened};
+use crate::text::{is_slip, nearest_hint, nearest_name, shortened};
 
 /// Key prefixes of aliases and of ROS parameter files that are not in the schema and that no joint may have as a name.
 const RESERVED: &[&str] = &["constraints", "qos_overrides", "ros__parameters"];
@@ -81,11 +81,17 @@ impl ParameterLayout {
         }
     }
 
+    /// Returns true if `key` is a parameter of the machine or of one of these joints, not of the node.
+    pub fn is_of_machine(&self, key: &str) -> bool {
+        self.check_name(key, &ValueSource::named("")).is_ok()
+            && plain_definition(key).is_none_or(|definition| definition.scope != Scope::Node)
+    }
+
     /// Returns true if `key` is a parameter of rclcpp without effect here, or resembles no parameter of this machine, so that
     /// it is probably meant for another node.
     pub fn is_foreign(&self, key: &str) -> bool {
-        is_rclcpp_parameter(key)
-            || self.check_name(key, &ValueSource::named("")).is_err() && self.nearest(key).is_none()
+        let resembles = || self.slip(key).is_some() || key.contains('.') && self.keys_with_end(key).is_some();
+        is_rclcpp_parameter(key) || self.check_name(key, &ValueSource::named("")).is_err() && !resembles()
     }
 
     /// Rejects a value that the parameter `key` does not permit; a parameter of another kind of axis passes.
@@ -101,7 +107,17 @@ impl ParameterLayout {
     }
 
     fn nearest(&self, key: &str) -> Option<String> {
-        self.keys_with_end(key).or_else(|| nearest_name(key, self.definitions().map(|(known, _)| known)))
+        self.keys_with_end(key).or_else(|| self.slip(key))
+    }
+
+    /// Returns the nearest key if `key` looks like a slip of it: in the same group, or with few other characters.
+    fn slip(&self, key: &str) -> Option<String> {
+        let group = |key: &str| key.split_once('.').map(|(first, _)| first.to_owned());
+        nearest_name(key, self.definitions().map(|(known, _)| known)).filter(|name| {
+            is_rclcpp_parameter(key)
+                || group(key).is_some_and(|first| group(name) == Some(first))
+                || is_slip(key, name)
+        })
     }
 
     fn unknown(&self, key: &str, at: &ValueSource) -> ConfigError {

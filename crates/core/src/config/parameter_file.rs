@@ -38,6 +38,10 @@ pub(super) struct ParameterFile {
     pub shared: HashSet<String>,
     /// Error about the first key without value (`null`, as `ros2 param dump` writes a parameter that is not set).
     pub unset: Option<ConfigError>,
+    /// Keys set twice in one section, of which the last value applies, and the errors about them.
+    pub repeated: Vec<(String, ConfigError)>,
+    /// Keys with values of no ROS parameter type, and the errors about them.
+    pub unusable: Vec<(String, ConfigError)>,
 }
 
 /// Reads the parameters of `text` for the node `node` (fully qualified, `/ns/name`). With `None`, reads the only section, or
@@ -48,6 +52,10 @@ pub(super) fn read(
     node: Option<&str>,
 ) -> Result<ParameterFile, ConfigError> {
     let root = parse(text, source)?;
+    // All sections are commented out.
+    if node.is_some() && matches!(root.value, YamlNode::Null) {
+        return Ok(ParameterFile::default());
+    }
     let YamlNode::Map(entries) = root.value else {
         return Err(not_a_parameter_file(
             &source.at_line(root.referenced.line()),
@@ -66,10 +74,12 @@ pub(super) fn read(
     for section in sections {
         if only || matches(&section.path, node.unwrap_or(ANY_NODE)) {
             file.matched += 1;
-            let first = file.assignments.len();
-            let keys = if section.path.contains('*') { &mut file.shared } else { &mut own };
-            section.flatten(source, &mut file.assignments, &mut file.unset)?;
-            keys.extend(file.assignments[first..].iter().map(|one| one.key.clone()));
+            let is_shared = section.path.contains('*');
+            let (first, first_unusable) = (file.assignments.len(), file.unusable.len());
+            section.flatten(source, &mut file)?;
+            let unusable = file.unusable[first_unusable..].iter().map(|(key, _)| key);
+            let found = file.assignments[first..].iter().map(|one| &one.key).chain(unusable).cloned();
+            if is_shared { file.shared.extend(found) } else { own.extend(found) }
         } else {
             file.skipped.push(shortened(&section.path));
         }
@@ -121,15 +131,12 @@ struct Section {
 }
 
 impl Section {
-    fn flatten(
-        self,
-        source: &ValueSource,
-        out: &mut Vec<Assignment>,
-        unset: &mut Option<ConfigError>,
-    ) -> Result<(), ConfigError> {
-        let mut lines = HashMap::new();
+    fn flatten(self, source: &ValueSource, file: &mut ParameterFile) -> Result<(), ConfigError> {
         match self.parameters.value {
-            YamlNode::Map(entries) => flatten(entries, "", source, &mut lines, out, unset),
+            YamlNode::Map(entries) => {
+                flatten(entries, "", source, &mut HashMap::new(), file);
+                Ok(())
+            }
             // All parameters of the section are commented out.
             YamlNode::Null => Ok(()),
             other => Err(not_a_parameter_file(
@@ -145,31 +152,31 @@ fn flatten(
     prefix: &str,
     source: &ValueSource,
     lines: &mut HashMap<String, u64>,
-    out: &mut Vec<Assignment>,
-    unset: &mut Option<ConfigError>,
-) -> Result<(), ConfigError> {
+    file: &mut ParameterFile,
+) {
     for (name, node) in entries {
         let line = name.referenced.line();
         let at = source.at_line(line);
         let key = if prefix.is_empty() { name.value } else { format!("{prefix}.{}", name.value) };
         match node.value {
-            YamlNode::Map(entries) => flatten(entries, &key, source, lines, out, unset)?,
+            YamlNode::Map(entries) => flatten(entries, &key, source, lines, file),
             YamlNode::Scalar(value) => {
                 if let Some(first) = lines.insert(key.clone(), line) {
-                    let first = source.at_line(first);
-                    let key = shortened(&key);
-                    let reason = format_args!("duplicate parameter {key}, first set at {first}");
-                    return Err(ConfigError::at(&at, reason));
+                    let (name, first) = (shortened(&key), source.at_line(first));
+                    let reason = format_args!("duplicate parameter {name}, first set at {first}");
+                    file.repeated.push((key.clone(), ConfigError::at(&at, reason)));
                 }
-                out.push(Assignment { key, value, source: at });
+                file.assignments.push(Assignment { key, value, source: at });
             }
             YamlNode::Null => {
-                unset.get_or_insert(no_value(&at, &key, &YamlNode::Null));
+                file.unset.get_or_insert(no_value(&at, &key, &YamlNode::Null));
             }
-            other => return Err(no_value(&at, &key, &other)),
+            other => {
+                let error = no_value(&at, &key, &other);
+                file.unusable.push((key, error));
+            }
         }
     }
-    Ok(())
 }
 
 fn collect_sections(

@@ -47,6 +47,8 @@ pub struct OverlayReport {
     pub skipped: Vec<String>,
     /// Reasons why parameters are ignored: this node does not have them, or cannot follow the value for a controller.
     pub ignored: Vec<String>,
+    /// Parameters that a section for several nodes sets twice; the last value applies.
+    pub repeated: Vec<String>,
 }
 
 /// Returns the end of a message about an unknown machine: the nearest built-in machine, and all of them.
@@ -97,7 +99,8 @@ impl Parameters {
     pub fn from_yaml(text: &str, source: &str) -> Result<Self, ConfigError> {
         let source = ValueSource::file(source);
         let file = parameter_file::read(text, &source, None)?;
-        file.unset.map_or(Ok(()), Err)?;
+        let errors = file.unusable.into_iter().chain(file.repeated).map(|(_, error)| error);
+        errors.chain(file.unset).next().map_or(Ok(()), Err)?;
         Self::from_assignments(Entries::new(), file.assignments, &source)
     }
 
@@ -149,8 +152,11 @@ impl Parameters {
         let mut assignments = file.assignments;
         let has = |wanted: &dyn Fn(&str) -> bool| assignments.iter().any(|one| wanted(&one.key));
         let has_joints = has(&|key| key == "joints");
-        let is_machine_replaced =
-            has(&|key| key == "machine") || has_joints && has(&|key| key.ends_with(".type"));
+        // A section for several nodes may have a parameter `machine` of another node.
+        let has_machine = has(&|key| key == "machine")
+            && (!file.shared.contains("machine")
+                || has(&|key| key != "machine" && self.layout.is_of_machine(key)));
+        let is_machine_replaced = has_machine || has_joints && has(&|key| key.ends_with(".type"));
         // The node reads its own dump, in which a parameter without value is null.
         file.unset.filter(|_| is_machine_replaced && node.is_none()).map_or(Ok(()), Err)?;
         let filter = FileFilter {
@@ -158,14 +164,27 @@ impl Parameters {
             layout: &self.layout,
             shared: &file.shared,
             is_machine: is_machine_replaced,
+            has_manager: file.skipped.iter().any(|path| path.ends_with("/controller_manager")),
         };
-        let ignored = filter.remove_ignored(&mut assignments).iter().map(ToString::to_string).collect();
+        let ignored = filter.remove_ignored(&mut assignments, file.unusable)?;
+        let is_error = |(key, _): &&(String, ConfigError)| {
+            node.is_none() || is_machine_replaced || !file.shared.contains(key)
+        };
+        if let Some((_, error)) = file.repeated.iter().find(is_error) {
+            return Err(error.clone());
+        }
         let report = OverlayReport {
             parameters: assignments.len(),
             is_machine_replaced,
             sections: file.matched,
             skipped: file.skipped,
-            ignored,
+            ignored: ignored.iter().map(ToString::to_string).collect(),
+            repeated: file
+                .repeated
+                .iter()
+                .filter(|(key, _)| assignments.iter().any(|one| one.key == *key))
+                .map(|(_, error)| error.to_string())
+                .collect(),
         };
         let mut base = self.entries.clone();
         if report.is_machine_replaced {
@@ -284,6 +303,13 @@ impl Parameters {
             let (key, value) = aliases::resolve(&key, &value, &source, &entries)?;
             changed.push(key.clone());
             entries.insert(key, ParameterEntry { value, source });
+        }
+        // A file for all nodes sets `use_sim_time`, and later this one is made the publisher of `/clock`.
+        let has_changed = |wanted: &str| changed.iter().any(|key| key == wanted);
+        let is_fast =
+            || entries.get("time").is_some_and(|entry| entry.value == Value::Text("fast".to_owned()));
+        if has_changed("time") && !has_changed("use_sim_time") && is_fast() {
+            entries.remove("use_sim_time");
         }
         if changed.iter().any(|key| key == "joints") {
             // The parameters of removed joints are removed.

@@ -47,6 +47,19 @@ impl Value {
         }
     }
 
+    /// Returns the value of a flag; of texts the words of YAML 1.1, which ROS reads: `yes`, `no`, `on`, `off`, `y`, `n`.
+    pub(super) fn flag(&self) -> Option<bool> {
+        match self {
+            Self::Bool(flag) => Some(*flag),
+            Self::Text(text) => match text.to_ascii_lowercase().as_str() {
+                "y" | "yes" | "on" => Some(true),
+                "n" | "no" | "off" => Some(false),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
     /// Returns type and value for a message: `text "abc"`.
     pub(super) fn described(&self) -> String {
         match self {

@@ -9,9 +9,9 @@ use super::error::{ConfigError, ValueSource};
 use super::value::Value;
 use crate::yaml::{self, YamlError};
 
-/// Reads one YAML document.
+/// Reads one YAML document; its mappings may repeat keys.
 pub(super) fn parse(text: &str, source: &ValueSource) -> Result<Spanned<YamlNode>, ConfigError> {
-    yaml::document(text).map_err(|YamlError { line, reason }| {
+    yaml::document_with_repeated_keys(text).map_err(|YamlError { line, reason }| {
         ConfigError::at(&source.at_line(line), format_args!("invalid YAML: {reason}"))
     })
 }

@@ -50,6 +50,13 @@ fn forward(own: &[u8], domain_id: u16, peers: &[String]) -> io::Result<()> {
     let announcements = bind(domain_id)?;
     let out = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
     let mut buffer = vec![0; 1 << 16];
+    for peer in peers.iter().filter(|peer| addresses(peer, domain_id).is_empty()) {
+        warn!(
+            "ROS_STATIC_PEERS: {} has no IPv4 address at present; entries are names or IPv4 addresses of hosts, separated \
+             by semicolons, and names are looked up again",
+            peer.escape_debug()
+        );
+    }
     loop {
         let (length, _) = announcements.recv_from(&mut buffer)?;
         let datagram = &buffer[..length];

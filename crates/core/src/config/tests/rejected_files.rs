@@ -8,7 +8,10 @@ use crate::config::{Parameters, ValueSource};
 #[test]
 fn duplicate_key_in_a_mapping() {
     let text = mikron_with("b: 0.01965", "b: 0.01965\n        b: 3");
-    assert_rejected(&text, "b: 3", "my.yaml:{line}: invalid YAML: duplicate key b");
+    let first = line_of(&text, "b: 0.01965");
+    let expected =
+        format!("my.yaml:{{line}}: duplicate parameter x.friction.b, first set at my.yaml:{first}");
+    assert_rejected(&text, "b: 3", &expected);
 }
 
 #[test]

@@ -289,7 +289,13 @@ mill:
         let assignment = parse_assignment(text, &ValueSource::named("-p")).expect("an assignment");
         parameters.ignored(&assignment).map(|reason| reason.to_string())
     };
-    assert_eq!(ignored("foreign:=1").as_deref(), Some("-p: unknown parameter foreign"));
+    for foreign in ["foreign", "cell", "base", "gain", "arr", "frame_id", "rate", "plugin.name"] {
+        let reason = ignored(&format!("{foreign}:=1"));
+        assert!(reason.is_some_and(|reason| reason.starts_with(&format!("-p: unknown parameter {foreign}"))));
+    }
+    for slip in ["publsh_rate", "velocity_loop.gain", "use_sim_tiem"] {
+        assert_eq!(ignored(&format!("{slip}:=1")), None, "{slip}");
+    }
     assert!(ignored("start_type_description_service:=false").is_some());
     assert!(
         ignored("gains.x.p:=2.0")
@@ -298,6 +304,123 @@ mill:
     for own in ["x.velocity_loop.gian:=4", "constraints.goal_time:=1", "command_interfaces:=[position]"] {
         assert_eq!(ignored(own), None);
     }
+}
+
+/// Returns the parameters of a node `/mill` after a file, and its warnings.
+fn overlaid(text: &str) -> Result<(Parameters, Vec<String>), String> {
+    let mut parameters = mikron();
+    let overlay =
+        parameters.overlay_yaml(text, "site.yaml", Some("/mill")).map_err(|error| error.to_string())?;
+    Ok((parameters, [overlay.ignored, overlay.repeated].concat()))
+}
+
+#[test]
+fn the_last_of_several_values_in_a_shared_section_applies() {
+    let text = "\
+/**:
+  ros__parameters:
+    cell: 1
+    x: {velocity_loop: {gain: 4}}
+    cell: 2
+    x.velocity_loop.gain: 4.5
+mill:
+  ros__parameters: {y.velocity_loop.gain: 3}
+mill:
+  ros__parameters: {z.velocity_loop.gain: 3.5}
+";
+    let (parameters, warnings) = overlaid(text).expect("a valid file");
+    for (key, value) in [("x", 4.5), ("y", 3.0), ("z", 3.5)] {
+        assert_eq!(parameters.get(&format!("{key}.velocity_loop.gain")), Some(Value::Double(value)));
+    }
+    assert_eq!(
+        warnings,
+        [
+            "site.yaml:3: unknown parameter cell",
+            "site.yaml:6: duplicate parameter x.velocity_loop.gain, first set at site.yaml:4",
+        ]
+    );
+    let own = "mill:\n  ros__parameters:\n    x.velocity_loop.gain: 4\n    x.velocity_loop.gain: 5\n";
+    let error = "site.yaml:4: duplicate parameter x.velocity_loop.gain, first set at site.yaml:3";
+    assert_eq!(overlaid(own).map(|_| ()), Err(error.to_owned()));
+}
+
+#[test]
+fn files_of_other_nodes_that_ros_reads_are_accepted() {
+    for text in ["", "# nothing\n", "---\n"] {
+        assert_eq!(overlaid(text), Ok((mikron(), Vec::new())), "{text}");
+        assert!(Parameters::from_yaml(text, "my.yaml").is_err());
+    }
+    let shared = |lines: &str| overlaid(&format!("/**:\n  ros__parameters:\n    {lines}\n"));
+    for (line, reason) in [
+        ("arr: [1, two]", "arr: found a list with mixed types or nested items, expected a value"),
+        ("arr: [{a: 1}]", "arr: found a list with mixed types or nested items, expected a value"),
+        (
+            "machine: vmc_3",
+            "machine = vmc_3: must be part of a complete machine, which a machine file describes",
+        ),
+        (
+            "joints: [shoulder, elbow]",
+            "joints = [shoulder, elbow]: must be part of a complete machine, which a machine file describes",
+        ),
+    ] {
+        assert_eq!(shared(line), Ok((mikron(), vec![format!("site.yaml:3: {reason}")])), "{line}");
+    }
+    for (line, reason) in [
+        ("x.velocity_loop.gain: [1, two]", "x.velocity_loop.gain: found a list with mixed types"),
+        ("joints: [x, elbow]", "elbow.type is missing"),
+        ("machine: vmc_3\n    x.velocity_loop.gain: 4.0", "joints is missing"),
+    ] {
+        assert!(shared(line).is_err_and(|error| error.contains(reason)), "{line}");
+    }
+}
+
+#[test]
+fn the_publisher_of_the_clock_ignores_use_sim_time_of_a_file_for_all_nodes() {
+    let shared = "/**:\n  ros__parameters: {use_sim_time: true}\n";
+    let fast = || Assignment {
+        key: "time".to_owned(),
+        value: Value::Text("fast".to_owned()),
+        source: ValueSource::named("-p"),
+    };
+    let mut parameters = mikron();
+    parameters.set_all(vec![fast()]).expect("a choice");
+    let overlay = parameters.overlay_yaml(shared, "site.yaml", Some("/mill")).expect("a valid file");
+    assert_eq!(
+        overlay.ignored,
+        ["site.yaml:2: use_sim_time = true: must be false for this node: time = fast publishes /clock"]
+    );
+    assert!(parameters.overlay_yaml(&shared.replace("/**", "mill"), "own.yaml", Some("/mill")).is_err());
+
+    let mut parameters = mikron();
+    parameters.overlay_yaml(shared, "site.yaml", Some("/mill")).expect("a valid file");
+    assert!(parameters.node_config().use_sim_time);
+    parameters.set_all(vec![fast()]).expect("a choice");
+    let config = parameters.node_config();
+    assert!(!config.use_sim_time && config.time == TimeMode::Fast);
+}
+
+#[test]
+fn a_file_with_a_controller_manager_is_a_file_of_controllers() {
+    let own =
+        "base:\n  ros__parameters: {left_wheel_names: [l], wheel_separation: 0.5, publish_rate: 50.0}\n";
+    assert!(mikron().overlay_yaml(own, "base.yaml", Some("/base")).is_err());
+    let manager = "controller_manager:\n  ros__parameters: {update_rate: 100}\n";
+    let overlay = mikron().overlay_yaml(&format!("{manager}{own}"), "base.yaml", Some("/base"));
+    assert_eq!(overlay.map(|overlay| overlay.ignored.len()), Ok(2));
+}
+
+#[test]
+fn a_flag_may_be_a_word_that_ros_reads_as_one() {
+    let key = "allow_nonzero_velocity_at_trajectory_end";
+    for (word, flag) in
+        [("yes", true), ("On", true), ("y", true), ("no", false), ("OFF", false), ("N", false)]
+    {
+        let (parameters, _) =
+            overlaid(&format!("mill:\n  ros__parameters: {{{key}: {word}}}\n")).expect(word);
+        assert_eq!(parameters.get(key), Some(Value::Bool(flag)), "{word}");
+    }
+    let error = overlaid(&format!("mill:\n  ros__parameters: {{{key}: 'true'}}\n"));
+    assert!(error.is_err_and(|error| error.contains("found text \"true\", expected true or false")));
 }
 
 #[test]
