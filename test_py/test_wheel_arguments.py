@@ -31,7 +31,7 @@ def machine() -> va.Machine:
 @pytest.mark.parametrize(
     ("call", "error", "text"),
     [
-        (lambda m: m.simulate(None), TypeError, "elements of type object; it must have real numbers"),
+        (lambda m: m.simulate(None), TypeError, "psec is of type NoneType; it must have real numbers"),
         (lambda m: m.simulate("ballbar"), TypeError, r"psec is 'ballbar'; a scenario is scenario\(name\)"),
         (lambda m: m.simulate(np.zeros(5)), ValueError, r"shape \(5,\); it needs \(setpoints, 5\)"),
         (lambda m: m.simulate(np.zeros((2, 3, 5))), ValueError, r"shape \(2, 3, 5\)"),

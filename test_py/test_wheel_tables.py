@@ -102,6 +102,9 @@ def test_columns_of_real_polars_and_xarray_are_matched_by_name(machine: va.Machi
     ]
     for table in tables:
         assert np.array_equal(machine.simulate(table).position, expected)
+    unnamed = xarray.DataArray(np.zeros((COUNT, 5)), dims=("time", "axis"), coords={"time": TIMES})
+    with pytest.raises(ValueError, match="psec has the coordinates time; one of them must name the columns"):
+        machine.simulate(unnamed)
 
 
 def test_a_table_with_times_is_interpolated_as_by_the_command(machine: va.Machine, tmp_path: Path) -> None:

@@ -58,6 +58,18 @@ fn tables_fit_a_terminal_of_80_columns() {
     assert_fits(&["psec", "campaign", "--axis", "x", "--out", &file]);
     text(&["psec", "ballbar", "--out", &file]);
     assert_fits(&["check", &file]);
+    assert_fits(&["tune", "corner-90", "--controller", "contour"]);
+    let recording = folder.path("recording.csv");
+    text(&["run", "x-there-and-back", "--trace", &recording]);
+    assert_fits(&["identify", &recording, "--axis", "x"]);
+    let machine = machine_with_long_names(&folder);
+    for scenario in ["c-constant", "c-two-speeds"] {
+        let scenario = long_named(&folder, scenario);
+        assert_fits(&["run", &scenario, "--machine", &machine, "--controller", "cascade,gpc"]);
+        assert_fits(&["check", &scenario, "--machine", &machine]);
+        assert_fits(&["tune", &scenario, "--machine", &machine, "--controller", "cascade"]);
+    }
+    assert_fits(&["run", "pocket", "--machine", "vmc", "--controller", "cascade,gpc"]);
     for list in ["scenarios", "machines", "parameters", "interface"] {
         assert_fits(&[list]);
     }

@@ -88,6 +88,8 @@ def to_floats(name: str, values: Any) -> NDArray[np.float64]:
         if wrong:
             found = f"{reprlib.repr(wrong[0])} of type {type(wrong[0]).__name__}"
             raise TypeError(f"{name} has the element {found}; it must have real numbers")
+    elif array.dtype.kind == "O":
+        raise TypeError(f"{name} is of type {type(values).__name__}; it must have real numbers")
     elif array.dtype.kind not in "buif":
         raise TypeError(f"{name} has elements of type {array.dtype}; it must have real numbers")
     return array.astype(np.float64)

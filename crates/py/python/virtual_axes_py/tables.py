@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from datetime import datetime, timedelta, timezone
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -68,7 +68,14 @@ def _pairs(name: str, given: Any) -> Iterable[tuple[Any, Any]] | None:
         return [*shared, *given.data_vars.items()]
     if hasattr(given, "to_dataset") and hasattr(given, "dims"):
         texts = [dim for dim in given.dims if dim in given.coords and given.coords[dim].dtype.kind in "UOT"]
-        return _pairs(name, given.to_dataset(dim=texts[0]).reset_coords(drop=True)) if len(texts) == 1 else None
+        if not given.coords and not texts:
+            return None
+        if len(texts) != 1:
+            coordinates = ", ".join(map(str, given.coords))
+            raise ValueError(
+                f"{name} has the coordinates {coordinates}; one of them must name the columns, as ['x', 'y']"
+            )
+        return _pairs(name, given.to_dataset(dim=texts[0]).reset_coords(drop=True))
     if isinstance(given, Mapping):
         return given.items()
     if hasattr(given, "iloc") and hasattr(given, "columns"):
@@ -105,7 +112,7 @@ def numbers(name: str, values: Any) -> NDArray[np.float64]:
     first = array[0] if array.dtype.kind == "O" and array.ndim and len(array) else None
     if isinstance(first, datetime):
         # The difference of two local times of one time zone would be that of their clock.
-        array = np.array([one.astimezone(timezone.utc) if one.tzinfo else one for one in array], object)
+        array = np.array([one.astimezone(UTC) if one.tzinfo else one for one in array], object)
         array = array - array[0]
     if isinstance(first, datetime | timedelta):
         array = array.astype("timedelta64[ns]")

@@ -89,7 +89,9 @@ pub fn text(problem: &TuningProblem<'_>, found: &TuningResult, warning: Option<&
         let front = found.pareto();
         let mut rows = Table { columns: columns("cost against modulus margin"), ..Table::default() };
         for one in table_rows(&front) {
-            rows.rows.push(candidate_row(one.tuning.to_string(), one, problem));
+            // The group of the only parameter of contour control is in the table above.
+            let tuning = one.tuning.to_string().replace("contour_control.", "");
+            rows.rows.push(candidate_row(tuning, one, problem));
         }
         text.push_str(&format!("\n{}", text_table::text(&rows)));
         if front.len() > ROWS {
