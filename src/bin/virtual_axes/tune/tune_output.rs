@@ -72,13 +72,17 @@ pub fn csv(problem: &TuningProblem<'_>, found: &TuningResult) -> String {
 /// Returns the result as tables.
 pub fn text(problem: &TuningProblem<'_>, found: &TuningResult, warning: Option<&str>) -> String {
     let columns = |first: &str| columns(first, problem.cost(), &problem.present().figures);
-    let mut text = format!(
-        "{}\n{}: {} of {}, cost {}\n\n{}\n{}",
-        text_table::wrapped_line(verdict(problem, found, warning).trim_end()),
+    let title = format!(
+        "{}: {} of {}, cost {}",
         escaped(problem.workload().name()),
         escaped(problem.config().name()),
         problem.joints().join(", "),
         problem.cost(),
+    );
+    let mut text = format!(
+        "{}\n{}\n{}\n{}",
+        text_table::wrapped_line(verdict(problem, found, warning).trim_end()),
+        text_table::wrapped_line(&title),
         text_table::text(&tunings(problem, found)),
         text_table::text(&values(problem, &found.best.tuning)),
     );
