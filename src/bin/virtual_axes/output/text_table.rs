@@ -88,24 +88,30 @@ fn arranged(table: &Table, left: &[usize], layout: Layout) -> String {
 }
 
 /// Returns the smallest width of each column of text. They share what the columns of numbers leave; the narrowest gets
-/// what it needs first, and each of the others keeps room for its longest word.
+/// what it needs first, and where the table would be too wide, each of the others keeps room for its longest word.
 fn text_widths(table: &Table, left: &[usize], Layout { gap, word }: Layout) -> Vec<(usize, u16)> {
     let least = |index: usize| longest_word(table, index, word);
     let numbers = (0..table.columns.len()).filter(|index| !left.contains(index));
     let used: u16 = numbers.map(|index| least(index) + gap).sum();
     let mut widths: Vec<(usize, u16)> = left.iter().map(|&index| (index, widest(table, index))).collect();
     widths.sort_by_key(|(_, width)| *width);
-    let mut spare = WIDTH.saturating_sub(used);
-    let mut count = u16::try_from(left.len()).unwrap_or(1);
-    let mut kept: u16 = left.iter().map(|&index| least(index) + gap).sum();
-    for (index, width) in &mut widths {
-        kept = kept.saturating_sub(least(*index) + gap);
-        let share = (spare / count.max(1)).min(spare.saturating_sub(kept)).saturating_sub(gap);
-        *width = (*width).min(share).max(least(*index));
-        spare = spare.saturating_sub(*width + gap);
-        count = count.saturating_sub(1);
-    }
-    widths
+    let shared = |is_kept: bool| {
+        let (mut widths, mut spare) = (widths.clone(), WIDTH.saturating_sub(used));
+        let mut count = u16::try_from(left.len()).unwrap_or(1);
+        let mut kept: u16 = left.iter().map(|&index| least(index) + gap).sum();
+        for (index, width) in &mut widths {
+            kept = kept.saturating_sub(least(*index) + gap);
+            let rest = if is_kept { kept } else { 0 };
+            let share = (spare / count.max(1)).min(spare.saturating_sub(rest)).saturating_sub(gap);
+            *width = (*width).min(share).max(if is_kept { least(*index) } else { 0 });
+            spare = spare.saturating_sub(*width + gap);
+            count = count.saturating_sub(1);
+        }
+        widths
+    };
+    let equal = shared(false);
+    let total: u16 = equal.iter().map(|(index, width)| (*width).max(least(*index)) + gap).sum();
+    if used + total <= WIDTH + gap { equal } else { shared(true) }
 }
 
 /// Returns the number of columns of figures with these headings, at least 1, that fit beside a column of names and one
