@@ -80,7 +80,7 @@ def to_floats(name: str, values: Any) -> NDArray[np.float64]:
     """
     array = to_array(name, values)
     if isinstance(array, np.ma.MaskedArray):
-        return array.astype(np.float64).filled(np.nan)
+        return np.asarray(np.ma.filled(array.astype(np.float64), np.nan), dtype=np.float64)
     if array.dtype == np.float64:
         return array
     if array.dtype.kind == "O" and array.ndim:
