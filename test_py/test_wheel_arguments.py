@@ -31,7 +31,7 @@ def machine() -> va.Machine:
 @pytest.mark.parametrize(
     ("call", "error", "text"),
     [
-        (lambda m: m.simulate(None), TypeError, "elements of type object; it must have real numbers"),
+        (lambda m: m.simulate(None), TypeError, "psec is of type NoneType; it must have real numbers"),
         (lambda m: m.simulate("ballbar"), TypeError, r"psec is 'ballbar'; a scenario is scenario\(name\)"),
         (lambda m: m.simulate(np.zeros(5)), ValueError, r"shape \(5,\); it needs \(setpoints, 5\)"),
         (lambda m: m.simulate(np.zeros((2, 3, 5))), ValueError, r"shape \(2, 3, 5\)"),
@@ -95,6 +95,26 @@ def machine() -> va.Machine:
         (lambda m: va.nc_program("pocket", work_offset={"G54": [0.0] * 7}), ValueError, "has 7 values; it must have X"),
         (lambda m: va.nc_program("pocket", tools={1: 0.05}), ValueError, r"tools: tool 1 has the shape \(\)"),
         (lambda m: va.nc_program("pocket", tools={1: (0.05,)}), ValueError, "tool 1 has 1 values; it must have length"),
+        (lambda m: va.scenario("ballbar").psec("vmc"), TypeError, "machine is of type str; it must be a Machine"),
+        (lambda m: va.nc_program("pocket").psec(None), TypeError, "machine is of type NoneType; it must be a Machine"),
+        (lambda m: va.merge(3), TypeError, "directory is of type int; it must be a name or a path"),
+        (lambda m: va.sweep(m, [{}], STILL, out=3), TypeError, "out is of type int; it must be a name or a path"),
+        (lambda m: va.random_variants(1, 1, {"x.position_loop.gain": 3}), TypeError, "bounds 3 must be two numbers"),
+        (lambda m: va.robustness(m, STILL, by="a"), TypeError, "by is 'a'; it must be a real number"),
+        (lambda m: va.learn(m, STILL, gain="a"), TypeError, "gain is 'a'; it must be a real number"),
+        (lambda m: va.learn(m, STILL, bandwidth_hz="a"), TypeError, "bandwidth_hz is 'a': must be real number"),
+        (lambda m: va.tune("vmc", STILL), TypeError, "machine is of type str; it must be a Machine"),
+        (lambda m: va.tune(m, STILL, cost=3), TypeError, "cost is 3: 'int' object"),
+        (lambda m: va.tune(m, STILL, modulus_margin="a"), TypeError, "modulus_margin is 'a': must be real number"),
+        (lambda m: va.tune(m, STILL, controller="gpc", designs=1.5), TypeError, "designs 1.5: must be an integer"),
+        (lambda m: va.tune(m, STILL, controller="cascade", seed=-1), ValueError, "seed -1: must be from 0 to"),
+        (lambda m: va.nc_program("pocket", tool_change_s="a"), TypeError, "tool_change_s is 'a': must be real number"),
+        (lambda m: m.simulate(STILL, figures=None), TypeError, "figures is None: 'None' is not an instance of 'str'"),
+        (lambda m: m.simulate(STILL, every_tick="no"), TypeError, "every_tick is 'no': 'str' object"),
+        (lambda m: m.simulate(STILL, signals=["positon"]), ValueError, "signal 'positon' is unknown; the nearest is"),
+        (lambda m: m.simulate({"x": ["0"]}), TypeError, "psec of x has elements of type <U1"),
+        (lambda m: m.simulate([{"x": 0.0}]), TypeError, "psec has the element {'x': 0.0} of type dict"),
+        (lambda m: m.simulate({"x": [0.0, None]}), ValueError, "at 0.006 s: x: position is NaN"),
         (lambda m: va.identify(3, "x"), TypeError, "recording is of type int; it must be a path, a dictionary"),
     ],
 )
@@ -127,6 +147,7 @@ def test_a_layout_of_an_array_does_not_matter(machine: va.Machine) -> None:
 
 
 def test_models_and_controllers_can_be_pickled(machine: va.Machine) -> None:
+    assert va.Rst([25.0], [1.0], [25.0]) == va.design.rst([25.0], [1.0], [25.0])
     model = va.design.model(machine, "x")
     rst = va.design.gpc(model, 12, lambda_rel=0.1)
     assert pickle.loads(pickle.dumps(model)) == model != va.design.model(machine, "y")

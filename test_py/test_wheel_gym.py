@@ -218,13 +218,18 @@ def test_an_offset_of_the_velocity_setpoint_moves_an_axis_at_rest_by_its_gain(ma
         ({"motion": "nowhere"}, "nowhere"),
         ({"motion": np.zeros((5, 5)), "feed": (1.0, 2.0)}, "feed"),
         ({"preview": 0}, "preview 0"),
+        ({"preview": "a"}, "preview 'a': must be an integer"),
+        ({"settling": -1}, "settling -1: must be from 0"),
+        ({"error_scale": "a"}, "error_scale is 'a'; it must be a real number"),
+        ({"residual": "a"}, "residual is 'a'; it must have numbers"),
+        ({"feed": (1.0,)}, "must be two positive numbers"),
         ({"randomize": {"x.gain": (1.0, 2.0)}}, "unknown parameter x.gain"),
         ({"randomize": {"x.position_loop.gain": (-1.0, 2.0)}}, "x.position_loop.gain = -1"),
         ({"randomize": {"x.position_loop.gain": (2.0, 1.0)}}, "the lower one first"),
     ],
 )
 def test_an_option_out_of_range_is_named(options: dict, text: str) -> None:
-    with pytest.raises(ValueError, match=text):
+    with pytest.raises((TypeError, ValueError), match=text):
         ContouringEnv(**options).reset()
 
 

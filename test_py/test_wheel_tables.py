@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import csv
 import json
+import pickle
 import subprocess
 import sys
+from datetime import timedelta
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +24,8 @@ COMMAND = str(Path(node_binary()).with_name("virtual_axes"))
 COUNT = 100
 X, Y = np.linspace(0, 0.01, COUNT), np.linspace(0, -0.005, COUNT)
 TIMES = 0.006 * np.arange(COUNT)
+# Over the change to summer time: the steps are of the time of the world.
+CLOCK = pd.date_range("2024-03-31 01:59:59.9", periods=COUNT, freq="6ms", tz="Europe/Berlin")
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +66,15 @@ TABLES = {
     "pandas, time as index": pd.DataFrame({"y": Y, "x": X}, index=pd.Index(TIMES, name="time")),
     "pandas, durations": pd.DataFrame({"y": Y, "x": X}, index=pd.to_timedelta(6 * np.arange(COUNT), unit="ms")),
     "pandas, time as column": pd.DataFrame({"y": Y, "time": TIMES, "x": X}),
+    "pandas, time zone": pd.DataFrame({"y": Y, "x": X}, index=CLOCK),
+    "pandas, dates as column": pd.DataFrame({"time": CLOCK.tz_convert("UTC").tz_localize(None), "y": Y, "x": X}),
+    "pandas, objects": pd.DataFrame({"y": Y, "x": X}, dtype=object),
+    "pandas, rows of a selection": pd.DataFrame({"y": [9, *Y], "x": [9, *X]}).iloc[1:],
+    "pandas, two indices": pd.DataFrame({"x": X}, index=pd.MultiIndex.from_arrays([TIMES, Y], names=["time", "y"])),
+    "dates of Python": {"time": list(CLOCK.to_pydatetime()), "y": Y, "x": X},
+    "durations of Python": {"time": [timedelta(milliseconds=6 * row) for row in range(COUNT)], "y": Y, "x": X},
+    "decimals": {"y": [Decimal(repr(float(value))) for value in Y], "x": X},
+    "PyArrow, dates": pa.table({"y": Y, "time": pa.array(CLOCK), "x": X}),
     "pandas, axis as index": pd.DataFrame({"x": X}, index=pd.Index(Y, name="y")),
     "PyArrow": pa.table({"y": Y, "x": X}),
     "structured array": np.rec.fromarrays([Y, X], names="y,x"),
@@ -87,6 +102,9 @@ def test_columns_of_real_polars_and_xarray_are_matched_by_name(machine: va.Machi
     ]
     for table in tables:
         assert np.array_equal(machine.simulate(table).position, expected)
+    unnamed = xarray.DataArray(np.zeros((COUNT, 5)), dims=("time", "axis"), coords={"time": TIMES})
+    with pytest.raises(ValueError, match="psec has the coordinates time; one of them must name the columns"):
+        machine.simulate(unnamed)
 
 
 def test_a_table_with_times_is_interpolated_as_by_the_command(machine: va.Machine, tmp_path: Path) -> None:
@@ -101,8 +119,19 @@ def test_a_table_with_times_is_interpolated_as_by_the_command(machine: va.Machin
 @pytest.mark.parametrize(
     ("table", "text"),
     [
-        (pd.DataFrame({"x": X, "w": X}), "psec: axis 'w' is unknown; known are x, y, z, a, c, and time"),
-        ({"X": X}, "axis 'X' is unknown"),
+        (pd.DataFrame({"x": X, "w": X}), "psec: axis 'w' is unknown; known are x, y, z, a, c .m or rad., and time .s."),
+        ({"X": X}, "axis 'X' is unknown; the nearest is x"),
+        (pd.DataFrame({"x": X}, index=TIMES), "psec has an index of type float64 without a name: name it time"),
+        (
+            pd.DataFrame({"x": X}, index=pd.MultiIndex.from_arrays([TIMES, Y])),
+            "psec has an index of type object without a name",
+        ),
+        (pd.DataFrame({("x", "psec"): X, ("x", "position"): X}), r"axis \"\('x', 'psec'\)\" is unknown"),
+        (np.ma.masked_greater(np.column_stack([X] + 4 * [0 * X]), 0.005), "at 0.3 s: x: position is NaN"),
+        ({"time": TIMES, "x": np.where(X > 0.005, np.nan, X)}, "psec: row 50 of x is NaN, not a finite number"),
+        ({"time": np.where(X > 0, np.nan, X), "x": X}, "psec: row 1 of time is NaN, not a finite number"),
+        ({"time": np.maximum(TIMES, 0.0301), "x": X}, "psec: row 1 has the time 0.0301 s, after 0.0301 s; times must"),
+        ({"time": TIMES - 1, "x": X}, "psec: the times begin at -1 s; they must begin at 0 s or later"),
         (pd.DataFrame({"x": X}, index=pd.Index(X, name="z1")), "axis 'z1' is unknown"),
         (pd.DataFrame(np.column_stack([X, Y]), columns=["x", "x"]), "two columns 'x'"),
         (pd.DataFrame({"time": TIMES[::-1], "x": X}), "time"),
@@ -113,6 +142,12 @@ def test_a_table_with_times_is_interpolated_as_by_the_command(machine: va.Machin
 def test_an_unknown_column_is_refused(table: object, text: str, machine: va.Machine) -> None:
     with pytest.raises(ValueError, match=text):
         machine.simulate(table)
+
+
+def test_a_table_with_times_begins_at_rest_in_its_first_row(machine: va.Machine) -> None:
+    run = machine.simulate({"time": TIMES, "x": 0.2 + X})
+    assert run.position[0, 0] == 0.2
+    assert run.position[-1, 0] == pytest.approx(0.21, abs=1e-6)
 
 
 def test_a_stepper_takes_values_by_axis_name(machine: va.Machine) -> None:
@@ -143,8 +178,12 @@ def test_loads_have_the_bits_of_a_stepper_and_their_current(machine: va.Machine)
     expected = -500 * radius / parameters["x.motor.torque_constant_nm_a"]
     assert constant.load_current[5:, 0] == pytest.approx(expected, rel=1e-9)
     assert not constant.load_current[:, 1].any()
+    by_axis = machine.simulate(psec, loads=pd.Series({"x": 500.0}))
+    assert np.array_equal(by_axis.load_current, constant.load_current)
     with pytest.raises(ValueError, match="loads: axis 'w' is unknown"):
         machine.simulate(psec, loads={"w": 1.0})
+    with pytest.raises(ValueError, match="loads has columns of 2 and 3 values; they need one length"):
+        machine.simulate(psec, loads={"x": [0.0] * 2, "y": [0.0] * 3})
     with pytest.raises(ValueError, match="loads: row 0 of x is"):
         machine.simulate(psec, loads={"x": np.inf})
 
@@ -189,6 +228,10 @@ def test_a_limit_error_has_the_time_of_its_setpoint(row: int, machine: va.Machin
     psec[row, 1] = 9.0
     with pytest.raises(ValueError, match=f"^at {row * 6 / 1000:.6g} s: y"):
         machine.simulate(psec)
+    with pytest.raises(ValueError, match=f"^at {row * 6 / 1000:.6g} s: y"):
+        machine.simulate({"time": 0.006 * np.arange(1000), "y": psec[:, 1]})
+    # Limits are results of the audit.
+    assert not va.check(machine, {"time": 0.006 * np.arange(1000), "y": psec[:, 1]}).is_within_limits
 
 
 def test_a_data_frame_is_a_recording(machine: va.Machine, tmp_path: Path) -> None:
@@ -198,7 +241,15 @@ def test_a_data_frame_is_a_recording(machine: va.Machine, tmp_path: Path) -> Non
     expected = va.identify(channels, "x", slow, feedforward="off").parameters
     frame = pd.DataFrame(channels)
     assert va.identify(frame, "x", slow, feedforward="off").parameters == expected
-    assert va.identify([frame.set_index("time")], "x", slow, feedforward="off").parameters == expected
+    dated = pd.Timestamp("2024-01-01", tz="UTC") + pd.to_timedelta(run.time, unit="s")
+    tables = [
+        frame.set_index("time"),
+        frame.drop(columns="time").set_index(dated),
+        frame.astype(object).assign(operator="A"),
+        {**channels, "time": dated},
+    ]
+    for table in tables:
+        assert va.identify([table], "x", slow, feedforward="off").parameters == pytest.approx(expected, rel=1e-9)
     named = pd.DataFrame({"t_ms": 1e3 * run.time, "y.position": run.position[:, 1]})
     for channel, unit, factor in (("psec", "mm", 1e3), ("position", "mm", 1e3), ("current", "A", 1.0)):
         named[f"x.{channel} [{unit}]"] = factor * channels[channel]
@@ -231,6 +282,27 @@ def test_the_text_of_each_object_is_short(machine: va.Machine) -> None:
         assert len(repr(one)) < 160 and "\n" not in repr(one) and "object at" not in repr(one), repr(one)
     assert f"{run.figures['contour_error_um']['max']:.6g} µm" in repr(run)
     assert {"position", "contour_error", "following_error", "plot_polar"} <= set(dir(run))
+
+
+def test_an_error_of_a_key_has_the_nearest_one(machine: va.Machine) -> None:
+    run = machine.simulate({"x": X})
+    swept = va.sweep(machine, [{}], va.scenario("x-constant"))[0].figures
+    calls = {
+        "'x.position_loop.gian' is unknown; the nearest is x.position_loop.gain": lambda: machine.parameters[
+            "x.position_loop.gian"
+        ],
+        "'contour_eror_um' is unknown; the nearest is contour_error_um": lambda: run.figures["contour_eror_um"],
+        "'X' is unknown; the nearest is x; known are x, y, z, a, c": lambda: swept["axes"]["X"],
+        "'positon' is unknown; the nearest is position": lambda: run.signals["positon"],
+        "'curent' is unknown; the nearest is current": lambda: run.axis("x")["curent"],
+        "'w' is unknown; known are x": lambda: va.check(machine, va.scenario("x-constant")).axes["w"],
+    }
+    for text, call in calls.items():
+        with pytest.raises(KeyError, match=f"key {text}"):
+            call()
+    for one in (run.figures, machine.parameters, run.axis("x")):
+        assert pickle.loads(pickle.dumps(one)).keys() == one.keys() == copy.deepcopy(one).keys()
+    assert json.loads(json.dumps(run.figures)) == run.figures
 
 
 def test_mypy_finds_wrong_names_and_nothing_else(tmp_path: Path) -> None:

@@ -35,6 +35,22 @@ fn assert_fits(arguments: &[&str]) {
     }
 }
 
+/// Writes a machine whose rotary axes have long names, and a scenario of one of them.
+fn long_names(folder: &TestFolder) -> (String, String) {
+    const LONG: &str = "rotary_table_of_the_machine";
+    let of = |texts: &[(&str, &'static str)], name| {
+        texts.iter().find(|(known, _)| *known == name).map(|(_, text)| *text).expect("a built-in file")
+    };
+    let mut machine = of(virtual_axes_builtin::MACHINES, "mikron_ucp710").to_owned();
+    for axis in ["a", "c"] {
+        machine = machine.replace(&format!("\n    {axis}:\n"), &format!("\n    {LONG}_{axis}:\n"));
+        machine = machine.replace(&format!("\"{axis}\""), &format!("\"{LONG}_{axis}\""));
+    }
+    let scenario =
+        of(virtual_axes_builtin::SCENARIOS, "c-constant").replace("c_deg", &format!("{LONG}_c_deg"));
+    (folder.text_file("machine.yaml", &machine), folder.text_file("scenario.yaml", &scenario))
+}
+
 #[test]
 fn tables_fit_a_terminal_of_80_columns() {
     for (scenario, _) in virtual_axes_builtin::SCENARIOS {
@@ -58,6 +74,16 @@ fn tables_fit_a_terminal_of_80_columns() {
     assert_fits(&["psec", "campaign", "--axis", "x", "--out", &file]);
     text(&["psec", "ballbar", "--out", &file]);
     assert_fits(&["check", &file]);
+    assert_fits(&["tune", "corner-90", "--controller", "contour"]);
+    let recording = folder.path("recording.csv");
+    text(&["run", "x-there-and-back", "--trace", &recording]);
+    assert_fits(&["identify", &recording, "--axis", "x"]);
+    let (machine, scenario) = long_names(&folder);
+    assert_fits(&["check", &machine]);
+    assert_fits(&["run", &scenario, "--machine", &machine, "--controller", "cascade,gpc"]);
+    assert_fits(&["check", &scenario, "--machine", &machine]);
+    assert_fits(&["tune", &scenario, "--machine", &machine, "--controller", "cascade"]);
+    assert_fits(&["run", "pocket", "--machine", "vmc", "--controller", "cascade,gpc"]);
     for list in ["scenarios", "machines", "parameters", "interface"] {
         assert_fits(&[list]);
     }

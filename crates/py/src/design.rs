@@ -131,6 +131,7 @@ impl PyPredictionModel {
 #[pymethods]
 impl PyRst {
     #[new]
+    #[pyo3(signature = (r, s, t, t_first = 0))]
     fn new(r: Vec<f64>, s: Vec<f64>, t: Vec<f64>, t_first: i64) -> PyResult<Self> {
         Ok(PyRst { rst: CoreRst::new(&r, &s, &t, t_first).map_err(value_error)? })
     }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
-use pyo3::exceptions::PyUserWarning;
+use pyo3::exceptions::{PyTypeError, PyUserWarning};
 use pyo3::prelude::*;
 use virtual_axes_builtin::{PROGRAMS, SCENARIOS};
 use virtual_axes_core::path::Program;
@@ -28,10 +28,12 @@ const ROWS_PER_CHECK: usize = 500;
 /// Function that creates an object again, and its arguments: a name and an option.
 type Recreation<'py, T> = (Bound<'py, PyAny>, (String, T));
 
-/// Machine of the package, which holds the native one.
-#[derive(FromPyObject)]
-struct NativeMachine<'py> {
-    native: PyRef<'py, PyMachine>,
+/// Returns the native machine of a machine of the package.
+fn native<'py>(machine: &Bound<'py, PyAny>) -> PyResult<PyRef<'py, PyMachine>> {
+    machine.getattr("native").and_then(|native| Ok(native.extract()?)).map_err(|_| {
+        let found = machine.get_type().name().map_or_else(|_| "unknown".to_owned(), |name| name.to_string());
+        PyTypeError::new_err(format!("machine is of type {found}; it must be a Machine, as of Machine.load"))
+    })
 }
 
 /// Setpoints in memory, row after row.
@@ -96,7 +98,8 @@ fn cell(value: f64) -> String {
     if value.is_nan() { String::new() } else { value.to_string() }
 }
 
-/// Returns the setpoints of a table with times at the position cycles, as `virtual_axes run` reads them from CSV.
+/// Returns the setpoints of a table with times at the position cycles, as `virtual_axes run` reads them from CSV. Limits are
+/// those of the simulation, whose errors have the time.
 pub fn over_time<'py>(
     py: Python<'py>,
     machine: &PyMachine,
@@ -105,8 +108,11 @@ pub fn over_time<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let text = csv(names, columns)?;
     let rows = py.detach(|| {
-        let (limits, period) = (joint_limits(&machine.config, ""), machine.config.periods().position);
-        let mut reader = PsecCsvReader::new(text.as_bytes(), "psec", period, &limits).map_err(value_error)?;
+        let limits = joint_limits(&machine.config.without_trajectory_limits(), "");
+        let period = machine.config.periods().position;
+        let mut reader = PsecCsvReader::new(text.as_bytes(), "psec", period, &limits)
+            .map_err(value_error)?
+            .with_start_at_first_row();
         let (joints, axes) = (reader.joints().to_vec(), machine.config.axes().len());
         let (mut row, mut values) = (vec![0.0; joints.len()], Vec::new());
         while reader.next(&mut row).map_err(value_error)? {
@@ -172,8 +178,12 @@ impl PyScenario {
         self.scenario.description()
     }
 
-    fn psec<'py>(&self, py: Python<'py>, machine: NativeMachine<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let machine: &PyMachine = &machine.native;
+    fn psec<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = native)] machine: PyRef<'py, PyMachine>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let machine: &PyMachine = &machine;
         py.detach(|| self.rows(machine, self.program(machine)?))?.into_array(py)
     }
 
@@ -311,8 +321,12 @@ impl PartProgram {
         &self.path
     }
 
-    fn psec<'py>(&self, py: Python<'py>, machine: NativeMachine<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let machine: &PyMachine = &machine.native;
+    fn psec<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = native)] machine: PyRef<'py, PyMachine>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let machine: &PyMachine = &machine;
         let (rows, track) = py.detach(|| self.rows(machine))?;
         self.warn(py, &track, 1)?;
         rows.into_array(py)

@@ -20,7 +20,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from . import design
 from ._native import PartProgram, Rst, Scenario, __version__, machine_names, nc_program_names, scenario_names
-from .arguments import to_list, to_path, to_real
+from .arguments import named_errors, to_list, to_path, to_real
 from .chunks import SweepResult
 from .design import frequency_response as bode
 from .design import plot_bode
@@ -126,7 +126,8 @@ def nc_program(
         "tool_change_s": tool_change_s,
         "spindle_s": spindle_s,
     }
-    return PartProgram.load(to_path("name_or_path", name_or_path), arguments)
+    with named_errors(arguments):
+        return PartProgram.load(to_path("name_or_path", name_or_path), arguments)
 
 
 def _work_offsets(offsets: Mapping[str, Sequence[float]] | str | Iterable[str]) -> list[str]:

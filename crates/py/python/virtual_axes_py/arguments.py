@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import difflib
+import json
 import operator
 import os
-from typing import TYPE_CHECKING, Any
+import reprlib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from decimal import Decimal
+from numbers import Real
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +20,77 @@ if TYPE_CHECKING:
     from . import _native
 
 
-def to_floats(name: str, values: Any) -> NDArray[np.float64]:
-    """Returns an array of floats, without a copy if it is one.
+Value = TypeVar("Value")
+MOST_LISTED = 20
+"""Number of known names up to which an error lists them."""
 
-    Raises `TypeError` for anything but real numbers, `ValueError` for rows of different lengths.
-    """
-    if isinstance(values, np.ndarray) and values.dtype == np.float64:
+
+class Named(dict[str, Value]):
+    """Dictionary whose `KeyError` has the nearest key."""
+
+    def __missing__(self, key: str) -> Value:
+        """Raises `KeyError`."""
+        raise KeyError(unknown("key", key, self))
+
+
+def read_json(text: str) -> Any:
+    """Returns the values of a JSON text."""
+    return json.loads(text, object_hook=Named)
+
+
+def unknown(kind: str, name: object, known: Iterable[str]) -> str:
+    """Returns the text of an error for an unknown name, with the nearest one and, if they are few, all."""
+    names = list(known)
+    folded = {one.lower(): one for one in names}
+    near = difflib.get_close_matches(str(name).strip().lower(), folded, 1)
+    hints = [f"the nearest is {folded[one]}" for one in near]
+    if len(names) <= MOST_LISTED:
+        hints.append(f"known are {', '.join(names) or 'none'}")
+    return "; ".join([f"{kind} {name!r} is unknown", *hints])
+
+
+@contextmanager
+def named_errors(options: Mapping[str, Any]) -> Iterator[None]:
+    """Names the option and its value in a `TypeError` of the native module."""
+    try:
+        yield
+    except TypeError as error:
+        name = str(error).rpartition(".")[2]
+        if name not in options:
+            raise
+        raise TypeError(f"{name} is {reprlib.repr(options[name])}: {error.__cause__}") from None
+
+
+def to_array(name: str, values: Any) -> NDArray[Any]:
+    """Returns an array, without a copy if it is one; raises `ValueError` for rows of different lengths."""
+    if isinstance(values, np.ndarray):
         return values
     if isinstance(values, str | bytes):
         raise TypeError(f"{name} is {values!r}; it must have numbers")
     try:
-        array = np.asarray(values)
+        return np.asarray(values)
     except ValueError as error:
         raise ValueError(f"{name} has rows of different lengths") from error
-    if array.dtype.kind not in "buif":
+
+
+def to_floats(name: str, values: Any) -> NDArray[np.float64]:
+    """Returns an array of floats, without a copy if it is one; None and masked values are NaN.
+
+    Raises `TypeError` for anything but real numbers, `ValueError` for rows of different lengths.
+    """
+    array = to_array(name, values)
+    if isinstance(array, np.ma.MaskedArray):
+        return np.asarray(np.ma.filled(array.astype(np.float64), np.nan), dtype=np.float64)
+    if array.dtype == np.float64:
+        return array
+    if array.dtype.kind == "O" and array.ndim:
+        wrong = [one for one in array.flat if one is not None and not isinstance(one, Real | Decimal)]
+        if wrong:
+            found = f"{reprlib.repr(wrong[0])} of type {type(wrong[0]).__name__}"
+            raise TypeError(f"{name} has the element {found}; it must have real numbers")
+    elif array.dtype.kind == "O":
+        raise TypeError(f"{name} is of type {type(values).__name__}; it must have real numbers")
+    elif array.dtype.kind not in "buif":
         raise TypeError(f"{name} has elements of type {array.dtype}; it must have real numbers")
     return array.astype(np.float64)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,6 +10,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from . import _native
+from .arguments import read_json
 from .machine import Machine
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class SweepResult:
     def of(changes: Mapping[str, Any], outcome: Outcome) -> SweepResult:
         """Creates the result of an outcome."""
         text, error = outcome
-        return SweepResult(dict(changes), None if text is None else json.loads(text), error)
+        return SweepResult(dict(changes), None if text is None else read_json(text), error)
 
     def __repr__(self) -> str:
         """Returns the changes, and the error of a variant that failed."""

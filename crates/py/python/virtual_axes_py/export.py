@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _native
-from .arguments import to_native, to_path
+from .arguments import read_json, to_native, to_path
 from .tuning import named_path
 
 if TYPE_CHECKING:
@@ -34,7 +33,7 @@ class CheckResult:
     @property
     def axes(self) -> dict[str, Any]:
         """Largest values and limits by axis and quantity, of the axes that move."""
-        return dict(self.summary["axes"])
+        return self.summary["axes"]  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         """Returns the verdict and its reason."""
@@ -49,7 +48,7 @@ def check(machine: Machine, psec: Setpoints) -> CheckResult:
     Releases the global interpreter lock.
     """
     text, reason = _native.check(to_native(machine), named_path(machine, psec, "setpoints"))
-    return CheckResult(json.loads(text), reason)
+    return CheckResult(read_json(text), reason)
 
 
 def fmu(

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
+from .arguments import to_floats, to_list, to_real, to_whole
 from .machine import Machine
 from .stepper import Stepper
 from .study import draw, random_variants
@@ -40,7 +41,9 @@ ENVIRONMENT = "VirtualAxes/Contouring-v0"
 
 Array = NDArray[np.float64]
 Observation = NDArray[np.float32]
-Motion = str | os.PathLike[str] | _native.Scenario | Array | Callable[[np.random.Generator], Array]
+Motion = (
+    str | os.PathLike[str] | _native.Scenario | _native.PartProgram | Array | Callable[[np.random.Generator], Array]
+)
 Randomization = Mapping[str, tuple[float, float]] | Callable[[np.random.Generator], Mapping[str, Any]]
 """Bounds of parameters by key, or a function that draws changed parameters."""
 
@@ -72,8 +75,9 @@ class _Fleet:
         self.machine = machine if isinstance(machine, Machine) else Machine.load(machine)
         if action not in ("psec", "velocity"):
             raise ValueError(f'action {action!r}: must be "psec" or "velocity"')
-        if preview < 1 or settling < 0 or not error_scale > 0:
-            raise ValueError(f"preview {preview}, settling {settling}, error_scale {error_scale}: out of range")
+        preview, settling = to_whole("preview", preview, 1, 1000), to_whole("settling", settling, 0, 1_000_000)
+        if not to_real("error_scale", error_scale) > 0:
+            raise ValueError(f"error_scale {error_scale}: must be above 0 m")
         names = self.machine.axes
         self._motion, self._randomize = (motion, feed), self._checked_ranges(randomize)
         self._plan = self._planner(motion, feed)
@@ -96,7 +100,7 @@ class _Fleet:
             raise ValueError(f"axes {chosen}: must be some of {', '.join(names)}, each once")
         self._columns = np.array([names.index(name) for name in chosen])
         default = 1e-5 if action == "psec" else 0.1
-        size = np.asarray(default if residual is None else residual, dtype=np.float64)
+        size = to_floats("residual", default if residual is None else residual)
         if size.shape not in ((), (len(chosen),)) or not np.all(size > 0):
             raise ValueError(f"residual {residual}: must be above 0, one number or one for each of {', '.join(chosen)}")
         self._residual = size
@@ -114,14 +118,15 @@ class _Fleet:
         if feed is not None:
             if not isinstance(motion, str | os.PathLike):
                 raise ValueError("feed: needs the name or path of a scenario as motion")
-            name, (low, high) = os.fspath(motion), feed
+            name, bounds = os.fspath(motion), to_list("feed", feed)
+            low, high = bounds if len(bounds) == 2 else (np.nan, np.nan)
             if not 0 < low <= high < np.inf:
                 raise ValueError(f"feed {feed}: must be two positive numbers, the lower one first")
             return lambda random: _native.Scenario.load(name, float(random.uniform(low, high))).psec(self.machine)
         if callable(motion):
             return motion
         given = _native.Scenario.load(os.fspath(motion)) if isinstance(motion, str | os.PathLike) else motion
-        if isinstance(given, _native.Scenario):
+        if isinstance(given, _native.Scenario | _native.PartProgram):
             given = given.psec(self.machine)
         elif columns_of("motion", given) is not None:
             given = np.asarray(self.machine.setpoints(given))
@@ -265,8 +270,8 @@ class ContouringEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Creates the environment.
 
         - `machine`: a `Machine`, or name or path as for `Machine.load`.
-        - `motion`: scenario or its name or path, array (setpoints, axes) in m or rad, or a function that draws such an
-          array by a `numpy.random.Generator` at each reset.
+        - `motion`: scenario or its name or path, part program, array (setpoints, axes) in m or rad, or a function that
+          draws such an array by a `numpy.random.Generator` at each reset.
         - `feed`: bounds of a feed that is drawn at each reset, in the unit of the scenario that `motion` names.
         - `axes`: names of the axes of action and observation; by default those that move.
         - `action`: `psec`, an offset of PSEC, or `velocity`, an offset of Ω*, the output of the position controller.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -12,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from .arguments import to_floats, to_native, to_path
+from .arguments import Named, named_errors, read_json, to_native, to_path
 from .machine import Machine
-from .tables import columns_of
+from .tables import columns_of, numbers
 
 if TYPE_CHECKING:
     from .tables import Table
@@ -48,18 +47,18 @@ class Identification:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """All results with the keys and units of `virtual_axes identify --json`."""
-        found: dict[str, Any] = json.loads(self._native.json())
+        found: dict[str, Any] = read_json(self._native.json())
         return found
 
     @property
     def parameters(self) -> dict[str, float]:
         """Identified parameters by key, in the units of the machine file."""
-        return {value["key"]: value["value"] for value in self.summary["values"]}
+        return Named((value["key"], value["value"]) for value in self.summary["values"])
 
     @property
     def deviations(self) -> dict[str, float | None]:
         """Standard errors of the parameters by key, in their units; None where there is none, as for delays."""
-        return {value["key"]: value["standard_error"] for value in self.summary["values"]}
+        return Named((value["key"], value["standard_error"]) for value in self.summary["values"])
 
     @property
     def findings(self) -> list[str]:
@@ -98,7 +97,7 @@ def identify(
     validate: Recording | Sequence[Recording] = (),
     feedforward: Feedforward | Sequence[Feedforward] = (),
     validate_feedforward: Feedforward | Sequence[Feedforward] = (),
-    refine: Sequence[str] | None = None,
+    refine: str | Sequence[str] | None = None,
     free_i0: bool = False,
     presliding: bool = False,
     column: str | Sequence[str] = (),
@@ -148,14 +147,15 @@ def identify(
         "validate_feedforward": (
             [validate_feedforward] if isinstance(validate_feedforward, str) else list(validate_feedforward)
         ),
-        "refine": None if refine is None else list(refine),
+        "refine": None if refine is None else [refine] if isinstance(refine, str) else list(refine),
         "free_i0": free_i0,
         "presliding": presliding,
     }
     native = to_native(machine if machine is not None else Machine.load())
     files, both, others = _sources(recordings), _sources(transmission), _sources(validate)
     try:
-        return Identification(_native.identify(native, axis, files, both, others, options))
+        with named_errors(options):
+            return Identification(_native.identify(native, axis, files, both, others, options))
     except ValueError as error:
         # The options of the command have the names of the arguments, with dashes.
         text = str(error)
@@ -174,7 +174,7 @@ def _source(given: Any) -> Source:
     """Returns a recording as the native module takes it: a path, channels, or names and values of columns."""
     if isinstance(given, Mapping) and not hasattr(given, "data_vars"):
         return {name: _channel(name, values) for name, values in given.items()}
-    columns = None if isinstance(given, str | os.PathLike) else columns_of("recording", given)
+    columns = None if isinstance(given, str | os.PathLike) else columns_of("recording", given, skip_texts=True)
     if columns is None and not isinstance(given, str | bytes | os.PathLike):
         text = "it must be a path, a dictionary of channels, or a table, as Run.to_pandas() returns it"
         raise TypeError(f"recording is of type {type(given).__name__}; {text}")
@@ -187,7 +187,7 @@ def _source(given: Any) -> Source:
 
 def _channel(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Returns the values of a channel; raises `ValueError` unless they have one dimension."""
-    channel = to_floats(f"channel {name}", values)
+    channel = numbers(f"channel {name}", values)
     if channel.ndim != 1:
         raise ValueError(f"channel {name} has the shape {channel.shape}; it needs one dimension")
     return channel

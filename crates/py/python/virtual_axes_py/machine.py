@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from .arguments import to_floats, to_path
+from .arguments import Named, named_errors, read_json, to_floats, to_path, unknown
 from .run import Run
 from .tables import TIME, axis_columns, axis_values
 
@@ -98,7 +97,7 @@ class Machine:
         unless `allow_unstable`.
         """
         if axis not in self.axes:
-            raise ValueError(f"axis {axis!r} is unknown; known are {', '.join(self.axes)}")
+            raise ValueError(unknown("axis", axis, self.axes))
         if not isinstance(rst, _native.Rst):
             raise TypeError(
                 f"rst is of type {type(rst).__name__}; it must be an Rst, as design.rst(r, s, t) returns it"
@@ -150,7 +149,7 @@ class Machine:
     @property
     def parameters(self) -> dict[str, Any]:
         """All parameters with their values or defaults, in the units of the machine file."""
-        return self._native.parameters
+        return Named(self._native.parameters)
 
     def simulate(
         self,
@@ -184,6 +183,9 @@ class Machine:
         if isinstance(signals, str):
             raise TypeError(f"signals is {signals!r}; it must be a list of names")
         chosen = list(SIGNALS + TOOL_SIGNALS if signals is None else signals)
+        wrong = [name for name in chosen if name not in SIGNALS + TOOL_SIGNALS]
+        if wrong:
+            raise ValueError(unknown("signal", wrong[0], SIGNALS + TOOL_SIGNALS))
         of_tool = [name for name in chosen if name in TOOL_SIGNALS]
         if of_tool and signals is not None and figures == "axes":
             raise ValueError(f"signal {of_tool[0]!r} needs contour errors; figures must be 'all' or 'contour'")
@@ -194,18 +196,17 @@ class Machine:
             "every_tick": every_tick,
             "figures": figures,
         }
-        table, tool, text, count = self._native.simulate(given, forces, options)
+        with named_errors(options):
+            table, tool, text, count = self._native.simulate(given, forces, options)
         time = table.pop("time")
-        tool = {name: values for name, values in tool.items() if name in of_tool}
-        return Run(self, time, table, json.loads(text), count, given, tool, forces)
+        tool = Named((name, values) for name, values in tool.items() if name in of_tool)
+        return Run(self, time, Named(table), read_json(text), count, given, tool, forces)
 
     def _loads(self, loads: Loads) -> NDArray[np.float64]:
         """Returns loads as rows of all axes, N or N·m."""
-        if isinstance(loads, Mapping):
-            return np.atleast_2d(axis_values(self.axes, "loads", loads, 0.0))
-        columns = axis_columns(self, "loads", loads)
+        columns = None if isinstance(loads, Mapping) else axis_columns(self, "loads", loads)
         if columns is None:
-            return np.atleast_2d(to_floats("loads", loads))
+            return np.atleast_2d(axis_values(self.axes, "loads", loads, 0.0))
         if TIME in columns:
             raise ValueError("loads has a column time; it needs a row per position cycle, without times")
         none = np.zeros(len(next(iter(columns.values()))))
@@ -226,6 +227,7 @@ class Machine:
             return self._checked(to_floats("psec", psec))
         if TIME in columns:
             names = [TIME, *(axis for axis in self.axes if axis in columns)]
+            _check_times([columns[name] for name in names], names)
             return self._native.setpoints_over_time(names, [np.ascontiguousarray(columns[name]) for name in names])
         still = np.zeros(len(next(iter(columns.values()))))
         return self._checked(np.column_stack([columns.get(name, still) for name in self.axes]))
@@ -259,3 +261,22 @@ class Machine:
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickles the machine as the text of its file."""
         return Machine.from_yaml, (self.to_yaml(),)
+
+
+def _check_times(columns: Sequence[NDArray[np.float64]], names: Sequence[str]) -> None:
+    """Raises `ValueError` unless all values are finite and the times, the first column, rise from 0 or later."""
+    for name, values in zip(names, columns):
+        if not np.isfinite(values).all():
+            row = int(np.argmin(np.isfinite(values)))
+            raise ValueError(
+                f"psec: row {row} of {name} is {str(values[row]).replace('nan', 'NaN')}, not a finite number"
+            )
+    time = columns[0]
+    steps = np.diff(time)
+    if (steps <= 0).any():
+        row = int(np.argmax(steps <= 0))
+        raise ValueError(
+            f"psec: row {row + 1} has the time {time[row + 1]:.6g} s, after {time[row]:.6g} s; times must rise"
+        )
+    if len(time) and time[0] < 0:
+        raise ValueError(f"psec: the times begin at {time[0]:.6g} s; they must begin at 0 s or later")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arguments import to_path
+from .arguments import Named, to_path, unknown
 
 if TYPE_CHECKING:
     import pandas
@@ -202,9 +202,9 @@ class Run:
         """Returns the signals of one axis by name; raises `ValueError` for an unknown axis."""
         names = self.machine.axes
         if name not in names:
-            raise ValueError(f"axis {name!r} is unknown; known are {', '.join(names)}")
+            raise ValueError(unknown("axis", name, names))
         column = names.index(name)
-        return {signal: values[:, column] for signal, values in self.signals.items()}
+        return Named((signal, values[:, column]) for signal, values in self.signals.items())
 
     def circles(self) -> list[Circle]:
         """Returns the circles of a scenario, of which the first 8 have points. The motion is simulated again."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from .arguments import to_path
 from .chunks import Setup, Variants, load_pyarrow
 
 if TYPE_CHECKING:
@@ -161,7 +162,7 @@ def merge(directory: str | Path, out: str | Path | None = None) -> pandas.DataFr
     Parquet file instead. Raises `ValueError` with the missing rows, with the names of overlapping files, or with the
     name of a damaged file.
     """
-    folder = Path(directory)
+    folder = Path(to_path("directory", directory))
     rows, position, last = int(_read(folder / STUDY)["rows"]), 0, ""
     tables = []
     for first, end in [*_chunks(folder), (rows, rows)]:

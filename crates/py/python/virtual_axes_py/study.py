@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native, chunks, shards
-from .arguments import to_native, to_whole
+from .arguments import to_native, to_path, to_whole
 from .chunks import Setup, SweepResult
 from .machine import Machine
 
@@ -117,7 +117,9 @@ def random_variants(seed: int, n: int, bounds: Mapping[str, tuple[float, float]]
     """
     seed, n = to_whole("seed", seed, 0, 2**64 - 1), to_whole("n", n, 0, MOST_VARIANTS)
     for name, pair in bounds.items():
-        if len(pair) != 2 or not all(isinstance(value, int | float | np.integer | np.floating) for value in pair):
+        if np.shape(pair) != (2,) or not all(
+            isinstance(value, int | float | np.integer | np.floating) for value in pair
+        ):
             raise TypeError(f"{name}: bounds {pair!r} must be two numbers, the lower one first")
         low, high = pair
         if not (abs(low) <= LARGEST_BOUND and abs(high) <= LARGEST_BOUND and low <= high):
@@ -204,7 +206,7 @@ def sweep(
     if isinstance(rows, RandomVariants) and len(rows):
         _check_names(machine, rows[0])
     setup = Setup(machine, planned(machine, psec), figures, _threads(threads, executor))
-    store = None if out is None else shards.Store(Path(out))
+    store = None if out is None else shards.Store(Path(to_path("out", out)))
     size = chunk or (store.chunk() if store else None) or _chunk_size(setup, rows, executor, count)
     if store:
         size = store.open(shards.identity(setup, rows, size), chunk is not None, resume, (index, count))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .arguments import to_floats
+from .arguments import to_array, to_floats, unknown
 
 if TYPE_CHECKING:
     from .machine import Machine
@@ -27,17 +28,18 @@ class Table(Protocol):
         """Returns the number of rows or columns."""
 
 
-def columns_of(name: str, given: Any) -> dict[str, NDArray[np.float64]] | None:
+def columns_of(name: str, given: Any, *, skip_texts: bool = False) -> dict[str, NDArray[np.float64]] | None:
     """Returns the columns of a table by name; None for anything without names, as an array.
 
     The columns are those of a DataFrame of pandas or polars, of a table of PyArrow, of a structured array of NumPy, of
     a dictionary, or the variables of a dataset of xarray. A DataArray with two dimensions has a column for each label
     of the one with texts. A named index or coordinate is a column too. Durations and dates become seconds, dates
-    from the first one.
+    from the first one, with or without a time zone. Columns of anything but numbers are left out with `skip_texts`.
 
-    Raises `ValueError` for columns of different lengths or with one name, `TypeError` for anything but numbers.
+    Raises `ValueError` for columns of different lengths or with one name, and for an index of numbers without a name;
+    `TypeError` for anything but numbers.
     """
-    pairs = _pairs(given)
+    pairs = _pairs(name, given)
     if pairs is None:
         return None
     found: dict[str, NDArray[np.float64]] = {}
@@ -45,7 +47,11 @@ def columns_of(name: str, given: Any) -> dict[str, NDArray[np.float64]] | None:
         title = str(label)
         if title in found:
             raise ValueError(f"{name} has two columns {title!r}; names must differ")
-        found[title] = _numbers(f"{name} of {title}", values)
+        try:
+            found[title] = numbers(f"{name} of {title}", values)
+        except TypeError:
+            if not skip_texts:
+                raise
     shapes = {column.shape for column in found.values()}
     if found and (len(shapes) != 1 or len(next(iter(shapes))) != 1):
         listed = ", ".join(f"{title} {column.shape}" for title, column in found.items())
@@ -53,7 +59,7 @@ def columns_of(name: str, given: Any) -> dict[str, NDArray[np.float64]] | None:
     return found
 
 
-def _pairs(given: Any) -> Iterable[tuple[Any, Any]] | None:
+def _pairs(name: str, given: Any) -> Iterable[tuple[Any, Any]] | None:
     """Returns labels and values of the columns of a table, None for anything else."""
     if isinstance(given, np.ndarray):
         return None if given.dtype.names is None else [(label, given[label]) for label in given.dtype.names]
@@ -62,11 +68,18 @@ def _pairs(given: Any) -> Iterable[tuple[Any, Any]] | None:
         return [*shared, *given.data_vars.items()]
     if hasattr(given, "to_dataset") and hasattr(given, "dims"):
         texts = [dim for dim in given.dims if dim in given.coords and given.coords[dim].dtype.kind in "UOT"]
-        return _pairs(given.to_dataset(dim=texts[0]).reset_coords(drop=True)) if len(texts) == 1 else None
+        if not given.coords and not texts:
+            return None
+        if len(texts) != 1:
+            coordinates = ", ".join(map(str, given.coords))
+            raise ValueError(
+                f"{name} has the coordinates {coordinates}; one of them must name the columns, as ['x', 'y']"
+            )
+        return _pairs(name, given.to_dataset(dim=texts[0]).reset_coords(drop=True))
     if isinstance(given, Mapping):
         return given.items()
     if hasattr(given, "iloc") and hasattr(given, "columns"):
-        return _of_pandas(given)
+        return _of_pandas(name, given)
     if hasattr(given, "get_columns") and hasattr(given, "columns"):
         return [(column.name, column) for column in given.get_columns()]
     if hasattr(given, "column_names") and hasattr(given, "columns"):
@@ -74,25 +87,35 @@ def _pairs(given: Any) -> Iterable[tuple[Any, Any]] | None:
     return None
 
 
-def _of_pandas(table: Any) -> list[tuple[Any, Any]] | None:
+def _of_pandas(name: str, table: Any) -> list[tuple[Any, Any]] | None:
     """Returns the columns of a DataFrame; None for one without names, whose labels are 0, 1, …"""
     index = table.index
     named = [(name, index.get_level_values(level)) for level, name in enumerate(index.names) if name is not None]
     if not named and index.dtype.kind in "mM":
         named = [(TIME, index)]
+    if not named and (index.nlevels > 1 or index.inferred_type in ("floating", "period")):
+        remedy = "name it time (s) by rename_axis('time'), or drop it by reset_index(drop=True)"
+        raise ValueError(f"{name} has an index of type {index.dtype} without a name: {remedy}")
     if not named and list(table.columns) == list(range(table.shape[1])):
         return None
     return named + [(label, table.iloc[:, position]) for position, label in enumerate(table.columns)]
 
 
-def _numbers(name: str, values: Any) -> NDArray[np.float64]:
+def numbers(name: str, values: Any) -> NDArray[np.float64]:
     """Returns the values of a column; durations and dates in s, missing values as NaN."""
     if hasattr(values, "iloc") and not isinstance(values.dtype, np.dtype) and values.dtype.kind in tuple("biuf"):
         # A column of pandas that may have missing values.
         values = values.to_numpy(dtype=np.float64, na_value=np.nan)
-    if not hasattr(values, "dtype"):
-        return to_floats(name, values)
-    array = np.asarray(values)
+    if getattr(getattr(values, "dtype", None), "tz", None) is not None:
+        values = values.to_numpy(dtype="datetime64[ns]")
+    array = to_array(name, values)
+    first = array[0] if array.dtype.kind == "O" and array.ndim and len(array) else None
+    if isinstance(first, datetime):
+        # The difference of two local times of one time zone would be that of their clock.
+        array = np.array([one.astimezone(UTC) if one.tzinfo else one for one in array], object)
+        array = array - array[0]
+    if isinstance(first, datetime | timedelta):
+        array = array.astype("timedelta64[ns]")
     if array.dtype.kind == "M":
         array = array - array[:1]
     if array.dtype.kind == "m":
@@ -109,9 +132,9 @@ def axis_columns(machine: Machine, name: str, given: Any) -> dict[str, NDArray[n
     if found is None:
         return None
     axes = machine.axes
-    unknown = [title for title in found if title not in axes and title != TIME]
-    if unknown:
-        raise ValueError(f"{name}: axis {unknown[0]!r} is unknown; known are {', '.join(axes)}, and {TIME} (s)")
+    wrong = [title for title in found if title not in axes and title != TIME]
+    if wrong:
+        raise ValueError(f"{name}: {unknown('axis', wrong[0], axes)} (m or rad), and {TIME} (s)")
     if not any(title in axes for title in found):
         raise ValueError(f"{name} has no column of an axis; it needs one or more of {', '.join(axes)}")
     return found
@@ -131,11 +154,16 @@ def axis_values(axes: list[str], name: str, given: Any, missing: float | None = 
     values = {str(label): value for label, value in given.items()}
     if is_series and list(given.index) == list(range(len(given.index))):
         return np.asarray(given, dtype=np.float64)
-    unknown = [label for label in values if label not in axes]
-    if unknown:
-        raise ValueError(f"{name}: axis {unknown[0]!r} is unknown; known are {', '.join(axes)}")
+    wrong = [label for label in values if label not in axes]
+    if wrong:
+        raise ValueError(f"{name}: {unknown('axis', wrong[0], axes)}")
     absent = [axis for axis in axes if axis not in values]
     if absent and missing is None:
         raise ValueError(f"{name} has no value for {absent[0]}; it needs one for each of {', '.join(axes)}")
     columns = [to_floats(f"{name} of {axis}", values.get(axis, missing)) for axis in axes]
+    lengths = {len(column) for column in columns if column.ndim}
+    if len(lengths) > 1:
+        raise ValueError(
+            f"{name} has columns of {' and '.join(map(str, sorted(lengths)))} values; they need one length"
+        )
     return np.stack(np.broadcast_arrays(*columns), axis=-1)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _native
-from .arguments import to_native, to_whole
+from .arguments import named_errors, read_json, to_native, to_real, to_whole
 from .machine import Machine
 
 if TYPE_CHECKING:
@@ -57,7 +56,7 @@ def tune(
     delay_margin_ms: float | None = None,
     seed: int | None = None,
     designs: int | None = None,
-    also: Sequence[Setpoints] = (),
+    also: Setpoints | Sequence[Setpoints] = (),
     contrast: bool = False,
 ) -> TuningResult:
     """Searches the tuning of the position controllers with the least cost on a path, as `virtual_axes tune` does.
@@ -74,29 +73,28 @@ def tune(
     Raises `ValueError` with the command's text if an option is out of range or no tuning is within the margins.
     Releases the global interpreter lock and uses all cores.
     """
+    native = to_native(machine)
     chosen = controller if controller is not None else _controller(machine)
+    also = also if isinstance(also, list | tuple) else [also]
     if contrast and (chosen != "gpc" or len(also) != 1):
         raise ValueError("contrast requires controller gpc and exactly one path in also")
     if designs is not None and (contrast or chosen != "gpc"):
         raise ValueError("designs requires controller gpc without contrast")
-    if designs is not None and not 1 <= designs <= 1_000_000:
-        raise ValueError(f"designs {designs}: must be in 1 … 1000000")
     if seed is not None and chosen != "cascade":
         raise ValueError("seed requires controller cascade; the other searches have no seed")
-    if seed is not None and seed < 0:
-        raise ValueError(f"seed {seed}: must be at least 0")
     options = {
         "controller": chosen,
         "contrast": contrast,
         "cost": cost,
         "modulus_margin": modulus_margin,
         "delay_margin_ms": delay_margin_ms,
-        "seed": 1 if seed is None else seed,
-        "designs": designs,
+        "seed": 1 if seed is None else to_whole("seed", seed, 0, 2**64 - 1),
+        "designs": None if designs is None else to_whole("designs", designs, 1, 1_000_000),
     }
     paths = [named_path(machine, one, f"path {index + 1}") for index, one in enumerate([psec, *also])]
-    text, tuned = _native.tune(to_native(machine), paths[0], paths[1:], options)
-    return TuningResult(Machine(tuned), json.loads(text))
+    with named_errors(options):
+        text, tuned = _native.tune(native, paths[0], paths[1:], options)
+    return TuningResult(Machine(tuned), read_json(text))
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,8 +126,8 @@ def robustness(machine: Machine, psec: Setpoints, *, by: float = 0.3, cost: str 
     `psec` is the path, as for `Machine.simulate`, `by` the relative deviation, 0 … 0.8, and `cost` that of `tune`.
     Raises `ValueError` with the command's text for an option out of range. Releases the global interpreter lock.
     """
-    path = named_path(machine, psec, "path 1")
-    return RobustnessResult(json.loads(_native.robustness(to_native(machine), path, by, cost)))
+    native, path = to_native(machine), named_path(machine, psec, "path 1")
+    return RobustnessResult(read_json(_native.robustness(native, path, to_real("by", by), cost)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,6 +174,8 @@ def learn(
     Raises `ValueError` with the command's text for an option out of range, or if no axis moves. Releases the global
     interpreter lock.
     """
+    gain, encoder_step_um = to_real("gain", gain), to_real("encoder_step_um", encoder_step_um)
+    acceleration_excess = to_real("acceleration_excess", acceleration_excess)
     if not 0 < gain <= 2:
         raise ValueError(f"gain {gain}: must be above 0 and at most 2")
     if not 0 <= encoder_step_um <= 1000:
@@ -189,8 +189,10 @@ def learn(
         "encoder_step_um": encoder_step_um,
         "acceleration_excess": acceleration_excess,
     }
-    text, compensated = _native.learn(to_native(machine), named_path(machine, psec, "path 1"), options)
-    return LearningResult(compensated, json.loads(text))
+    native = to_native(machine)
+    with named_errors(options):
+        text, compensated = _native.learn(native, named_path(machine, psec, "path 1"), options)
+    return LearningResult(compensated, read_json(text))
 
 
 def named_path(machine: Machine, psec: Setpoints, name: str) -> tuple[str, str, Any]:

@@ -62,7 +62,7 @@ impl SimulationPage<'_> {
                 })
                 .collect(),
             overview: self.overview(),
-            sections: self.sections.clone(),
+            sections: std::iter::once(self.operations()).chain(self.sections.iter().cloned()).collect(),
             provenance: self.provenance.clone(),
         };
         report.write(output)
@@ -79,6 +79,16 @@ impl SimulationPage<'_> {
             section.tables.push(
                 program.page_table(capital(&format!("{of_run}lines with the largest contour errors")), index),
             );
+        }
+        section
+    }
+
+    /// Returns times and energy of part programs by operation, tool and line.
+    fn operations(&self) -> Section {
+        let mut section = Section::new("Times and energy of the program");
+        for run in self.runs {
+            let Some(program) = &run.part_program else { continue };
+            let of_run = if self.runs.len() > 1 { format!("{}: ", run.title()) } else { String::new() };
             let parts = [
                 ("times by operation", program.operations_table(usize::MAX, str::to_owned)),
                 ("times by tool", program.tools_table()),

@@ -26,7 +26,7 @@ use crate::input::part_program::{self, PartProgramArguments};
 use crate::input::setpoint_summary::SetpointSummary;
 use crate::input::{CommandInput, program_text};
 use crate::output::progress::TrialProgress;
-use crate::output::{interrupt, print_error};
+use crate::output::{interrupt, print_error, text_table};
 use limit_audit_output::LimitExcess;
 use row_audit::RowAudit;
 use virtual_axes_report::limit_audit;
@@ -298,5 +298,6 @@ fn machine(machine: &MachineConfig) -> String {
             AxisKind::Rotary => format!("{} (rotary)", axis.name()),
         })
         .collect();
-    format!("machine: {}\njoints: {}\nvalid\n", escaped(machine.name()), joints.join(", "))
+    let joints = text_table::wrapped_line(&format!("joints: {}", joints.join(", ")));
+    format!("machine: {}\n{joints}valid\n", escaped(machine.name()))
 }

@@ -10,8 +10,8 @@ pub const WIDTH: u16 = 80;
 const GAPS: [u16; 2] = [2, 1];
 /// Width of a column of text that is worth a smaller gap.
 const TEXT: u16 = 16;
-/// Length from which a word is divided anywhere.
-const WORD: u16 = 24;
+/// Lengths from which a word is divided anywhere: of most tables, and the smallest one of a table with many columns.
+const WORDS: [u16; 2] = [24, 8];
 /// Length of a word of a heading from which it is divided behind a hyphen.
 const LONG_WORD: usize = 12;
 
@@ -28,7 +28,7 @@ pub fn aligned(table: &Table, left: &[usize]) -> String {
     let natural =
         columns.clone().map(|index| widest(table, index).max(heading_width(table, index)) + GAPS[0]);
     if natural.sum::<u16>() <= WIDTH + GAPS[0] {
-        return arranged(table, left, GAPS[0]);
+        return arranged(table, left, Layout { gap: GAPS[0], word: WORDS[0] });
     }
     let mut table = table.clone();
     for column in &mut table.columns {
@@ -38,22 +38,37 @@ pub fn aligned(table: &Table, left: &[usize]) -> String {
         });
         column.name = words.collect::<Vec<_>>().join(" ");
     }
-    let smallest = |index: usize| match left.contains(&index) {
-        true => widest(&table, index).min(TEXT).max(longest_word(&table, index)),
-        false => longest_word(&table, index),
+    let smallest = |index: usize, word: u16| match left.contains(&index) {
+        true if word == WORDS[0] => widest(&table, index).min(TEXT).max(longest_word(&table, index, word)),
+        _ => longest_word(&table, index, word),
     };
-    let width = |gap: u16| columns.clone().map(|index| smallest(index) + gap).sum::<u16>() - gap;
-    let gap = GAPS.into_iter().find(|gap| width(*gap) <= WIDTH).unwrap_or(GAPS[1]);
-    arranged(&table, left, gap)
+    let width = |layout: &Layout| {
+        columns.clone().map(|index| smallest(index, layout.word) + layout.gap).sum::<u16>() - layout.gap
+    };
+    let narrow = |word| Layout { gap: GAPS[1], word };
+    let wide = Layout { gap: GAPS[0], word: WORDS[0] };
+    let mut layouts = std::iter::once(wide).chain((WORDS[1]..=WORDS[0]).rev().map(narrow));
+    let layout = layouts.find(|layout| width(layout) <= WIDTH).unwrap_or(narrow(WORDS[1]));
+    arranged(&table, left, layout)
 }
 
-/// Formats a table with this gap between its columns.
-fn arranged(table: &Table, left: &[usize], gap: u16) -> String {
+/// Arrangement of a table.
+#[derive(Clone, Copy)]
+struct Layout {
+    /// Blanks between two columns.
+    gap: u16,
+    /// Length from which a word is divided anywhere.
+    word: u16,
+}
+
+/// Formats a table with this arrangement.
+fn arranged(table: &Table, left: &[usize], layout: Layout) -> String {
+    let gap = layout.gap;
     let mut out = comfy_table::Table::new();
     out.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
     out.set_header(table.columns.iter().map(heading));
     out.add_rows(&table.rows);
-    let texts = text_widths(table, left, gap);
+    let texts = text_widths(table, left, layout);
     let last = table.columns.len();
     for (index, column) in out.column_iter_mut().enumerate() {
         column.set_padding((0, if index + 1 == last { 0 } else { gap }));
@@ -63,7 +78,7 @@ fn arranged(table: &Table, left: &[usize], gap: u16) -> String {
             CellAlignment::Right
         });
         let text = texts.iter().find(|(column, _)| *column == index).map_or(0, |(_, width)| *width);
-        let smallest = text.max(longest_word(table, index));
+        let smallest = text.max(longest_word(table, index, layout.word));
         column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(
             smallest + if index + 1 == last { 0 } else { gap },
         )));
@@ -73,20 +88,30 @@ fn arranged(table: &Table, left: &[usize], gap: u16) -> String {
 }
 
 /// Returns the smallest width of each column of text. They share what the columns of numbers leave; the narrowest gets
-/// what it needs first.
-fn text_widths(table: &Table, left: &[usize], gap: u16) -> Vec<(usize, u16)> {
+/// what it needs first, and where the table would be too wide, each of the others keeps room for its longest word.
+fn text_widths(table: &Table, left: &[usize], Layout { gap, word }: Layout) -> Vec<(usize, u16)> {
+    let least = |index: usize| longest_word(table, index, word);
     let numbers = (0..table.columns.len()).filter(|index| !left.contains(index));
-    let used: u16 = numbers.map(|index| longest_word(table, index) + gap).sum();
+    let used: u16 = numbers.map(|index| least(index) + gap).sum();
     let mut widths: Vec<(usize, u16)> = left.iter().map(|&index| (index, widest(table, index))).collect();
     widths.sort_by_key(|(_, width)| *width);
-    let mut spare = WIDTH.saturating_sub(used);
-    let mut count = u16::try_from(left.len()).unwrap_or(1);
-    for (_, width) in &mut widths {
-        *width = (*width).min((spare / count.max(1)).saturating_sub(gap));
-        spare = spare.saturating_sub(*width + gap);
-        count = count.saturating_sub(1);
-    }
-    widths
+    let shared = |is_kept: bool| {
+        let (mut widths, mut spare) = (widths.clone(), WIDTH.saturating_sub(used));
+        let mut count = u16::try_from(left.len()).unwrap_or(1);
+        let mut kept: u16 = left.iter().map(|&index| least(index) + gap).sum();
+        for (index, width) in &mut widths {
+            kept = kept.saturating_sub(least(*index) + gap);
+            let rest = if is_kept { kept } else { 0 };
+            let share = (spare / count.max(1)).min(spare.saturating_sub(rest)).saturating_sub(gap);
+            *width = (*width).min(share).max(if is_kept { least(*index) } else { 0 });
+            spare = spare.saturating_sub(*width + gap);
+            count = count.saturating_sub(1);
+        }
+        widths
+    };
+    let equal = shared(false);
+    let total: u16 = equal.iter().map(|(index, width)| (*width).max(least(*index)) + gap).sum();
+    if used + total <= WIDTH + gap { equal } else { shared(true) }
 }
 
 /// Returns the number of columns of figures with these headings, at least 1, that fit beside a column of names and one
@@ -102,14 +127,14 @@ pub fn columns_beside_text(headings: impl Iterator<Item = String>) -> usize {
 }
 
 /// Returns the length of the longest part of a column that is not divided: a word, or a figure of some words such as
-/// "12.79 of 54".
-fn longest_word(table: &Table, index: usize) -> u16 {
+/// "12.79 of 54"; at most `word`.
+fn longest_word(table: &Table, index: usize, word: u16) -> u16 {
     /// Longest figure, characters.
     const FIGURE: usize = 12;
     let heading = table.columns.get(index).map(heading).unwrap_or_default();
     let cells = table.rows.iter().filter_map(|row| row.get(index)).map(String::as_str);
     let figures = cells.clone().filter(|cell| cell.chars().count() <= FIGURE);
-    longest(figures.chain(cells.chain([heading.as_str()]).flat_map(str::split_whitespace))).min(WORD)
+    longest(figures.chain(cells.chain([heading.as_str()]).flat_map(str::split_whitespace))).min(word)
 }
 
 /// Returns the length of the heading of a column on one line.

@@ -72,13 +72,17 @@ pub fn csv(problem: &TuningProblem<'_>, found: &TuningResult) -> String {
 /// Returns the result as tables.
 pub fn text(problem: &TuningProblem<'_>, found: &TuningResult, warning: Option<&str>) -> String {
     let columns = |first: &str| columns(first, problem.cost(), &problem.present().figures);
-    let mut text = format!(
-        "{}\n{}: {} of {}, cost {}\n\n{}\n{}",
-        text_table::wrapped_line(verdict(problem, found, warning).trim_end()),
+    let title = format!(
+        "{}: {} of {}, cost {}",
         escaped(problem.workload().name()),
         escaped(problem.config().name()),
         problem.joints().join(", "),
         problem.cost(),
+    );
+    let mut text = format!(
+        "{}\n{}\n{}\n{}",
+        text_table::wrapped_line(verdict(problem, found, warning).trim_end()),
+        text_table::wrapped_line(&title),
         text_table::text(&tunings(problem, found)),
         text_table::text(&values(problem, &found.best.tuning)),
     );
@@ -89,7 +93,9 @@ pub fn text(problem: &TuningProblem<'_>, found: &TuningResult, warning: Option<&
         let front = found.pareto();
         let mut rows = Table { columns: columns("cost against modulus margin"), ..Table::default() };
         for one in table_rows(&front) {
-            rows.rows.push(candidate_row(one.tuning.to_string(), one, problem));
+            // The group of the only parameter of contour control is in the table above.
+            let tuning = one.tuning.to_string().replace("contour_control.", "");
+            rows.rows.push(candidate_row(tuning, one, problem));
         }
         text.push_str(&format!("\n{}", text_table::text(&rows)));
         if front.len() > ROWS {
