@@ -1,0 +1,208 @@
+//! Corners of two lines: path and speed, from the distance to the corner and the time that it takes.
+//!
+//! The time that a corner takes more than its two lines at their speed does not depend on filters; neither does it need the
+//! samples near the corner. With the distance of the setpoints from the corner, which filters increase, it determines speed
+//! and radius.
+
+use super::law::{Law, Smoothing};
+use super::ramp::plateau;
+use super::track::{Track, distance};
+use crate::motion::{AXIS_COUNT, Coordinates, PathControl};
+
+/// Smallest and largest change of direction of a corner, rad.
+const TURNS: [f64; 2] = [0.1, 3.0];
+/// Relative difference of the speeds of the lines.
+const SAME_SPEED: f64 = 1e-3;
+/// Number of halvings of a search.
+const HALVINGS: usize = 60;
+/// Steps of an integral over a filter.
+const STEPS: usize = 400;
+
+/// Corner of two lines with the same feed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Corner {
+    pub path_control: PathControl,
+    /// Change of direction, rad.
+    pub turn: f64,
+    /// Speed of the lines, m/s.
+    pub feed: f64,
+    /// Smallest acceleration limit of the axes that move, m/s².
+    pub limit: f64,
+    /// Speed in the corner, m/s.
+    pub speed: f64,
+    /// Radius of the path before the filters, m; 0 for the exact path.
+    pub radius: f64,
+}
+
+impl Corner {
+    /// Returns the corner behind a motion, if it is one between parts of constant speed.
+    pub fn of(track: &Track<'_>, index: usize, law: &Law) -> Option<Self> {
+        let [first, second] = [track.motions.get(index)?, track.motions.get(index + 1)?];
+        let is_corner =
+            [first, second].iter().all(|m| m.arc.is_none() && m.is_linear() && m.feed.is_finite());
+        if !is_corner || first.dwell.is_some() {
+            return None;
+        }
+        let directions = [first.direction(), second.direction()];
+        let length = |sign: f64| {
+            (0..AXIS_COUNT).map(|i| (directions[0][i] + sign * directions[1][i]).powi(2)).sum::<f64>().sqrt()
+        };
+        let turn = 2.0 * length(-1.0).atan2(length(1.0));
+        if !(TURNS[0]..=TURNS[1]).contains(&turn) {
+            return None;
+        }
+        let period = track.log.period;
+        let resolution = track.log.resolution;
+        let constant = |motion: usize| {
+            let [start, end] = track.samples[motion];
+            let places = track.places(motion, start..end);
+            let plateau = plateau(&places, resolution)?;
+            let middle = usize::midpoint(plateau.ends[0], plateau.ends[1]);
+            Some((start + middle, places[middle], plateau.step / period))
+        };
+        let (before, place, feed) = constant(index)?;
+        let (after, next_place, next_feed) = constant(index + 1)?;
+        if (next_feed / feed - 1.0).abs() > SAME_SPEED {
+            return None;
+        }
+        let lost = (after - before) as f64 * period - (first.length - place + next_place) / feed;
+        let reached = nearest(&track.log.positions[before..=after], &first.to);
+        let along = |direction: &Coordinates, of: &dyn Fn(usize) -> Option<f64>| {
+            (0..AXIS_COUNT)
+                .filter(|&i| direction[i] != 0.0)
+                .try_fold(f64::INFINITY, |least, i| Some(least.min(of(i)? / direction[i].abs())))
+        };
+        let acceleration = |axis: usize| Some(law.accelerations[axis]?.value);
+        let accelerations = [along(&directions[0], &acceleration)?, along(&directions[1], &acceleration)?];
+        let jerk = |axis: usize| match &law.smoothing {
+            Smoothing::Jerk(limits) => Some(limits[axis]?.value),
+            _ => Some(f64::INFINITY),
+        };
+        let jerks = [along(&directions[0], &jerk)?, along(&directions[1], &jerk)?];
+        let moving = (0..AXIS_COUNT).filter(|&i| directions.iter().any(|direction| direction[i] != 0.0));
+        let limit = moving.filter_map(acceleration).fold(f64::INFINITY, f64::min);
+        let lines = Lines { turn, feed, lost: lost.max(0.0), accelerations, jerks };
+        let filters = law.filters();
+        let most = 0.5 * first.length.min(second.length) / (0.5 * turn).tan();
+        let path = |radius: f64| lines.distance(radius, lines.speed(radius), &filters);
+        // The influence of the sampling on the distance of an exact corner.
+        let tolerance = 2.0 * resolution + 3e-7 + 0.05 * path(0.0);
+        let mut radius = 0.0;
+        if reached > path(0.0) + tolerance {
+            let [mut low, mut high] = [0.0, most];
+            for _ in 0..HALVINGS {
+                let middle = f64::midpoint(low, high);
+                if path(middle) < reached { low = middle } else { high = middle }
+            }
+            radius = low;
+        }
+        let speed = lines.speed(radius);
+        Some(Self { path_control: first.path_control, turn, feed, limit, speed, radius })
+    }
+
+    /// Returns the distance of an arc of unit radius from the corner.
+    pub fn bulge(&self) -> f64 {
+        1.0 / (0.5 * self.turn).cos() - 1.0
+    }
+
+    /// Returns the distance of the path from the corner, m.
+    pub fn distance(&self) -> f64 {
+        self.radius * self.bulge()
+    }
+
+    /// Returns the tolerance P, m.
+    pub fn tolerance(&self) -> Option<f64> {
+        match self.path_control {
+            PathControl::Blend(blend) => blend.tolerance,
+            _ => None,
+        }
+    }
+
+    /// Returns true in G64.
+    pub fn is_blended(&self) -> bool {
+        matches!(self.path_control, PathControl::Blend(_))
+    }
+}
+
+/// Two lines and the time that their corner takes.
+struct Lines {
+    turn: f64,
+    feed: f64,
+    lost: f64,
+    accelerations: [f64; 2],
+    jerks: [f64; 2],
+}
+
+impl Lines {
+    /// Returns the speed in a corner of a radius.
+    fn speed(&self, radius: f64) -> f64 {
+        let lost = |speed: f64| {
+            let change = self.feed - speed;
+            let ramps = self.accelerations.iter().zip(&self.jerks).map(|(a, j)| {
+                let jerk_time = (a / j).min((change / j).sqrt());
+                let time = if jerk_time > 0.0 { jerk_time + (change / a).max(jerk_time) } else { change / a };
+                0.5 * time * change / self.feed
+            });
+            let arc = radius * (self.turn / speed - 2.0 * (0.5 * self.turn).tan() / self.feed);
+            ramps.sum::<f64>() + arc
+        };
+        let [mut low, mut high] = [0.0, self.feed];
+        for _ in 0..HALVINGS {
+            let middle = f64::midpoint(low, high);
+            if lost(middle) > self.lost { low = middle } else { high = middle }
+        }
+        high
+    }
+
+    /// Returns the distance of the filtered path from the corner: the mean of the component towards the inside.
+    fn distance(&self, radius: f64, speed: f64, filters: &[f64]) -> f64 {
+        let half = 0.5 * self.turn;
+        let arc_time = radius * half / speed.max(f64::MIN_POSITIVE);
+        let a = 0.5 * (self.accelerations[0] + self.accelerations[1]);
+        let inside = |time: f64| {
+            if time < arc_time {
+                return radius / half.cos() - radius * (speed * time / radius).cos();
+            }
+            let time = time - arc_time;
+            let ramp = ((self.feed - speed) / a).min(time);
+            let line = speed * time + a * ramp * (time - 0.5 * ramp);
+            (radius * half.tan() + line) * half.sin()
+        };
+        let [long, short] = match *filters {
+            [] => return inside(0.0),
+            [one] => [one, 0.0],
+            [a, b, ..] => [a.max(b), a.min(b)],
+        };
+        let [outer, inner] = [0.5 * (long + short), 0.5 * (long - short)];
+        let step = outer / STEPS as f64;
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for k in 0..STEPS {
+            let time = (k as f64 + 0.5) * step;
+            let weight = if time <= inner { 1.0 } else { (outer - time) / (outer - inner) };
+            sum += weight * inside(time);
+            weights += weight;
+        }
+        sum / weights
+    }
+}
+
+/// Returns the smallest distance of a sampled path from a point; parabolas join the samples.
+fn nearest(positions: &[Coordinates], point: &Coordinates) -> f64 {
+    let away = |position: &Coordinates| distance(position, point);
+    let Some(best) =
+        (0..positions.len()).min_by(|a, b| away(&positions[*a]).total_cmp(&away(&positions[*b])))
+    else {
+        return f64::INFINITY;
+    };
+    let here = away(&positions[best]);
+    if best == 0 || best + 1 >= positions.len() {
+        return here;
+    }
+    let [before, middle, after] = [&positions[best - 1], &positions[best], &positions[best + 1]];
+    let at = |t: f64| -> Coordinates {
+        std::array::from_fn(|i| {
+            middle[i] + 0.5 * t * (after[i] - before[i] + t * (after[i] - 2.0 * middle[i] + before[i]))
+        })
+    };
+    (-20..=20).map(|k| away(&at(f64::from(k) / 20.0))).fold(here, f64::min)
+}

@@ -1,0 +1,38 @@
+//! `virtual_axes psec --probe`: part program that shows the profile of a control.
+
+use std::error::Error;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use virtual_axes_core::config::{DEFAULT_MACHINE, Parameters};
+use virtual_axes_io::files::OutputFile;
+use virtual_axes_nc::identify_control::probe_program;
+
+use crate::arguments::variant;
+use crate::input::must_not_replace;
+
+/// Arguments of `virtual_axes psec --probe`.
+#[derive(Debug, clap::Args)]
+pub struct ProbeArguments {
+    /// Output file: a part program in machine coordinates, for all work offsets 0.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Built-in machine or machine file whose travel limits, speeds and accelerations apply.
+    #[arg(long, default_value = DEFAULT_MACHINE)]
+    machine: String,
+    /// Set a parameter, for example `x.limits.travel_max_mm=300`; can be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+/// Writes the program and returns an empty text.
+pub fn run(arguments: &ProbeArguments) -> Result<String, Box<dyn Error>> {
+    must_not_replace(&arguments.out, Path::new(&arguments.machine))?;
+    let machine = Parameters::load(&arguments.machine, crate::builtin::MACHINES)?;
+    let config = variant::parameters(&machine, None, &arguments.set, &[])?.machine_config()?;
+    let text = probe_program(&config).map_err(|error| format!("{}: {error}", arguments.machine))?;
+    let mut file = OutputFile::create(&arguments.out)?;
+    file.write_all(text.as_bytes())?;
+    file.finish()?;
+    Ok(String::new())
+}
