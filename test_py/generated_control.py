@@ -1,7 +1,7 @@
 """Controls with known parameters, which make setpoints of simple part programs.
 
-They are written apart from the planner of the package, to judge what is identified from their setpoints: speeds by a pass
-forward and one backward over all motions, filters as moving averages of finely sampled positions.
+They are written apart from the planner of the package, to judge what is identified from their setpoints: speeds by a
+pass forward and one backward over all motions, filters as moving averages of finely sampled positions.
 """
 
 from __future__ import annotations
@@ -151,7 +151,10 @@ class Element:
 def elements(control: Control, program: str) -> list[Element]:
     """Returns the path with the corners of the control."""
     path = motions(program)
-    least = lambda values, direction: min(v / abs(d) for v, d in zip(values, direction, strict=True) if abs(d) > 1e-12)
+
+    def least(values: np.ndarray, direction: np.ndarray) -> float:
+        return min(value / abs(part) for value, part in zip(values, direction, strict=True) if abs(part) > 1e-12)
+
     jerk = control.jerk if control.jerk is not None else np.full(3, math.inf)
 
     def limits(motion: Motion) -> tuple[float, float, float]:
@@ -210,7 +213,10 @@ def elements(control: Control, program: str) -> list[Element]:
         speed, acceleration, jerk_limit = limits(motion)
         offset = motion.cuts[0]
         length = motion.length - sum(motion.cuts)
-        points = lambda place, motion=motion, offset=offset: motion.points(place + offset)
+
+        def points(place: np.ndarray, motion: Motion = motion, offset: float = offset) -> np.ndarray:
+            return motion.points(place + offset)
+
         if length > 1e-12 or corner is None:
             result.append(Element(points, max(length, 0.0), speed, acceleration, jerk_limit, limit, motion.dwell))
         if corner is not None:
@@ -263,7 +269,10 @@ def ends(control: Control, path: list[Element]) -> list[float]:
 def phases(element: Element, start: float, end: float) -> list[tuple[float, float, float, float]]:
     """Returns duration, speed, acceleration and jerk of the phases of an element."""
     low, high = max(start, end), max(element.speed, start, end)
-    needs = lambda peak: change(element, start, peak)[1] + change(element, peak, end)[1]
+
+    def needs(peak: float) -> float:
+        return change(element, start, peak)[1] + change(element, peak, end)[1]
+
     if needs(high) > element.length:
         for _ in range(60):
             middle = 0.5 * (low + high)

@@ -1,6 +1,6 @@
 //! Speed in rows of short lines, which the block cycle and the look-ahead limit.
 
-use super::law::{Estimate, Law};
+use super::law::{ControlEstimate, RampLaw};
 use super::track::Track;
 
 /// Fewest lines of a row.
@@ -23,14 +23,14 @@ struct Row {
 /// Limits that rows of short lines show.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
-    pub cycle: Option<Estimate>,
-    pub look_ahead: Option<Estimate>,
+    pub cycle: Option<ControlEstimate>,
+    pub look_ahead: Option<ControlEstimate>,
     /// Longest block cycle and smallest look-ahead that the rows leave.
     pub bounds: Option<[f64; 2]>,
 }
 
 impl Blocks {
-    pub fn of(track: &Track<'_>, law: &Law) -> Self {
+    pub fn of(track: &Track<'_>, law: &RampLaw) -> Self {
         let rows = rows(track, law);
         let mut blocks = Self::default();
         let cycle = |row: &Row| row.length / row.speed;
@@ -46,7 +46,7 @@ impl Blocks {
         let (by_cycle, others): (Vec<&Row>, Vec<&Row>) =
             limited.iter().partition(|row| cycle(row) < bounds[0] * (1.0 + SAME));
         if by_cycle.len() > 1 {
-            blocks.cycle = Estimate::of(by_cycle.iter().map(|row| cycle(row)).collect(), 1e-3);
+            blocks.cycle = ControlEstimate::of(by_cycle.iter().map(|row| cycle(row)).collect(), 1e-3);
         }
         // The speed varies by a part of 1/(2 N) within a line.
         let rest = if by_cycle.len() > 1 { others } else { limited };
@@ -55,13 +55,13 @@ impl Blocks {
         let alike: Vec<f64> =
             counts.into_iter().filter(|count| *count > largest * (1.0 - 4.0 * SAME)).collect();
         if !alike.is_empty() && (alike.len() > 1 || blocks.cycle.is_some()) {
-            blocks.look_ahead = Estimate::of(alike, SAME);
+            blocks.look_ahead = ControlEstimate::of(alike, SAME);
         }
         blocks
     }
 }
 
-fn rows(track: &Track<'_>, law: &Law) -> Vec<Row> {
+fn rows(track: &Track<'_>, law: &RampLaw) -> Vec<Row> {
     let mut rows = Vec::new();
     let mut first = 0;
     while first < track.motions.len() {

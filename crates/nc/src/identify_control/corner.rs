@@ -4,7 +4,7 @@
 //! samples near the corner. With the distance of the setpoints from the corner, which filters increase, it determines speed
 //! and radius.
 
-use super::law::{Law, Smoothing};
+use super::law::{RampLaw, Smoothing};
 use super::ramp::plateau;
 use super::track::{Track, distance};
 use crate::motion::{AXIS_COUNT, Coordinates, PathControl};
@@ -18,9 +18,9 @@ const HALVINGS: usize = 60;
 /// Steps of an integral over a filter.
 const STEPS: usize = 400;
 
-/// Corner of two lines with the same feed.
+/// LineCorner of two lines with the same feed.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Corner {
+pub(super) struct LineCorner {
     pub path_control: PathControl,
     /// Change of direction, rad.
     pub turn: f64,
@@ -34,9 +34,9 @@ pub(super) struct Corner {
     pub radius: f64,
 }
 
-impl Corner {
+impl LineCorner {
     /// Returns the corner behind a motion, if it is one between parts of constant speed.
-    pub fn of(track: &Track<'_>, index: usize, law: &Law) -> Option<Self> {
+    pub fn of(track: &Track<'_>, index: usize, law: &RampLaw) -> Option<Self> {
         let [first, second] = [track.motions.get(index)?, track.motions.get(index + 1)?];
         let is_corner =
             [first, second].iter().all(|m| m.arc.is_none() && m.is_linear() && m.feed.is_finite());

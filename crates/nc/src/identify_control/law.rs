@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::ramp::Ramp;
+use super::ramp::SpeedRamp;
 
 /// Value with the half width of its interval of 95 %.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Estimate {
+pub(super) struct ControlEstimate {
     pub value: f64,
     pub half_width: f64,
     /// Number of motions that it is from.
@@ -25,7 +25,7 @@ const BETTER: f64 = 0.25;
 /// Smallest ratio of the stages of a filter.
 const LEAST_STAGE: f64 = 0.05;
 
-impl Estimate {
+impl ControlEstimate {
     /// Returns the median of values; the interval is that of the mean, and at least `relative` of the value.
     pub fn of(mut values: Vec<f64>, relative: f64) -> Option<Self> {
         values.sort_by(f64::total_cmp);
@@ -47,16 +47,16 @@ pub(super) enum Smoothing {
     /// Trapezoidal speed; the sampling shows no filter longer than this, s.
     None(f64),
     /// Moving averages over these times, s.
-    Filters(Vec<Estimate>),
+    Filters(Vec<ControlEstimate>),
     /// Jerk limit of each axis.
-    Jerk(Vec<Option<Estimate>>),
+    Jerk(Vec<Option<ControlEstimate>>),
 }
 
-/// Law of the ramps of all axes.
+/// RampLaw of the ramps of all axes.
 #[derive(Debug, Clone)]
-pub(super) struct Law {
+pub(super) struct RampLaw {
     /// Acceleration of each axis; `None` without a ramp.
-    pub accelerations: Vec<Option<Estimate>>,
+    pub accelerations: Vec<Option<ControlEstimate>>,
     pub smoothing: Smoothing,
     /// True if filters and a jerk limit explain the ramps alike.
     pub is_ambiguous: bool,
@@ -70,7 +70,7 @@ struct Fit {
     covariance: DMatrix<f64>,
 }
 
-fn sigma(ramp: &Ramp, period: f64) -> f64 {
+fn sigma(ramp: &SpeedRamp, period: f64) -> f64 {
     RELATIVE * ramp.squares.abs() + OF_PERIOD * period * period
 }
 
@@ -103,7 +103,7 @@ fn jerk_squares(speed: f64, acceleration: f64, jerk: f64) -> f64 {
 }
 
 /// Returns the acceleration of a ramp with a known jerk limit; `None` if it is not reached.
-pub(super) fn jerk_limited_acceleration(ramp: &Ramp, jerk: f64) -> Option<f64> {
+pub(super) fn jerk_limited_acceleration(ramp: &SpeedRamp, jerk: f64) -> Option<f64> {
     // (v/a)² + (a/j)² is smallest, 2 v/j, where the acceleration is just reached.
     let half = 0.5 * ramp.squares * jerk * jerk;
     let root = half * half - (ramp.speed * jerk).powi(2);
@@ -112,9 +112,9 @@ pub(super) fn jerk_limited_acceleration(ramp: &Ramp, jerk: f64) -> Option<f64> {
 }
 
 /// Fits acceleration and jerk of one axis; the values are their logarithms.
-fn fit_jerk(ramps: &[Ramp], period: f64, start: [f64; 2]) -> Option<Fit> {
+fn fit_jerk(ramps: &[SpeedRamp], period: f64, start: [f64; 2]) -> Option<Fit> {
     let residuals = |logs: [f64; 2]| -> Vec<f64> {
-        let of = |ramp: &Ramp| {
+        let of = |ramp: &SpeedRamp| {
             let model = jerk_squares(ramp.speed, logs[0].exp(), logs[1].exp());
             (ramp.squares - model) / sigma(ramp, period)
         };
@@ -156,9 +156,9 @@ fn fit_jerk(ramps: &[Ramp], period: f64, start: [f64; 2]) -> Option<Fit> {
     None
 }
 
-impl Law {
+impl RampLaw {
     /// Fits the ramps of all axes; `None` without a ramp.
-    pub fn fit(ramps: &[Vec<Ramp>], period: f64) -> Option<Self> {
+    pub fn fit(ramps: &[Vec<SpeedRamp>], period: f64) -> Option<Self> {
         let axes: Vec<usize> = (0..ramps.len()).filter(|&axis| !ramps[axis].is_empty()).collect();
         if axes.is_empty() {
             return None;
@@ -191,7 +191,7 @@ impl Law {
             for &axis in &axes {
                 let values =
                     ramps[axis].iter().map(|ramp| ramp.speed / ramp.squares.max(f64::MIN_POSITIVE).sqrt());
-                law.accelerations[axis] = Estimate::of(values.collect(), 0.05);
+                law.accelerations[axis] = ControlEstimate::of(values.collect(), 0.05);
             }
             return Some(law);
         };
@@ -203,7 +203,7 @@ impl Law {
             let value = slope.powf(-0.5);
             let deviation = COVERAGE * fit.covariance[(column, column)].max(0.0).sqrt();
             let half_width = (0.5 * value * deviation / slope).max(1e-4 * value);
-            law.accelerations[axis] = Some(Estimate { value, half_width, count: ramps[axis].len() });
+            law.accelerations[axis] = Some(ControlEstimate { value, half_width, count: ramps[axis].len() });
         }
         if squares < threshold {
             return Some(law);
@@ -227,7 +227,7 @@ impl Law {
                         let value = fit.values[k].exp();
                         let half_width =
                             value * (COVERAGE * fit.covariance[(k, k)].max(0.0).sqrt()).max(1e-4);
-                        Some(Estimate { value, half_width, count: ramps[axis].len() })
+                        Some(ControlEstimate { value, half_width, count: ramps[axis].len() })
                     };
                     law.accelerations[axis] = of(0);
                     limits[axis] = of(1);
@@ -261,11 +261,11 @@ impl Law {
 
 /// Returns the times of one or two moving averages with a sum of squares.
 fn stages(
-    ramps: &[Vec<Ramp>],
-    accelerations: &[Option<Estimate>],
+    ramps: &[Vec<SpeedRamp>],
+    accelerations: &[Option<ControlEstimate>],
     [squares, deviation]: [f64; 2],
     period: f64,
-) -> Vec<Estimate> {
+) -> Vec<ControlEstimate> {
     // Slow ramps show the filters best.
     let mut fourth_powers = Vec::new();
     for (ramps, acceleration) in ramps.iter().zip(accelerations) {
@@ -280,10 +280,10 @@ fn stages(
     let count = ramps.iter().map(Vec::len).sum();
     let of = |square: f64, deviation: f64| {
         let value = square.sqrt();
-        Estimate { value, half_width: (0.5 * deviation / value).max(0.05 * period), count }
+        ControlEstimate { value, half_width: (0.5 * deviation / value).max(0.05 * period), count }
     };
     let one = vec![of(squares, deviation)];
-    let Some(sum) = Estimate::of(fourth_powers, 0.0) else { return one };
+    let Some(sum) = ControlEstimate::of(fourth_powers, 0.0) else { return one };
     let difference = (2.0 * sum.value - squares * squares).max(0.0).sqrt();
     let [first, second] = [0.5 * (squares + difference), 0.5 * (squares - difference)];
     if second < LEAST_STAGE * LEAST_STAGE * first || second < period * period {

@@ -22,9 +22,9 @@ pub use self::log::ControlLog;
 pub use self::probe::probe_program;
 
 use self::blocks::Blocks;
-use self::corner::Corner;
-use self::law::{Estimate, Law, Smoothing};
-use self::ramp::{Ramp, plateau, ramp};
+use self::corner::LineCorner;
+use self::law::{ControlEstimate, RampLaw, Smoothing};
+use self::ramp::{SpeedRamp, plateau, ramp};
 use self::track::{Track, motions};
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, PathControl, ProgramStep};
 
@@ -50,7 +50,7 @@ pub struct ControlIdentification {
     pub values: Vec<ControlValue>,
     /// Choices: key, value and reason.
     pub choices: Vec<(String, String, String)>,
-    /// What the program cannot show, with the remedy.
+    /// Properties that the program cannot show, each with the remedy.
     pub not_shown: Vec<String>,
     /// Time from the first to the last motion in the log, s.
     pub motion_time: f64,
@@ -59,7 +59,7 @@ pub struct ControlIdentification {
 }
 
 impl ControlIdentification {
-    fn push(&mut self, key: impl Into<String>, estimate: Estimate, factor: f64, unit: &'static str) {
+    fn push(&mut self, key: impl Into<String>, estimate: ControlEstimate, factor: f64, unit: &'static str) {
         self.values.push(ControlValue {
             key: key.into(),
             value: estimate.value / factor,
@@ -108,11 +108,11 @@ fn spread(values: &[f64]) -> f64 {
 }
 
 /// Identifies the rule for corners in G64.
-fn identify_corners(track: &Track<'_>, law: &Law, found: &mut ControlIdentification) {
-    let corners: Vec<Corner> = (0..track.motions.len().saturating_sub(1))
-        .filter_map(|index| Corner::of(track, index, law))
+fn identify_corners(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentification) {
+    let corners: Vec<LineCorner> = (0..track.motions.len().saturating_sub(1))
+        .filter_map(|index| LineCorner::of(track, index, law))
         .collect();
-    let blended: Vec<Corner> = corners.into_iter().filter(Corner::is_blended).collect();
+    let blended: Vec<LineCorner> = corners.into_iter().filter(LineCorner::is_blended).collect();
     if blended.is_empty() {
         found.not_shown.push(
             "corners: no corner in G64 of two lines of X, Y and Z with the same feed, both of which reach it"
@@ -124,14 +124,14 @@ fn identify_corners(track: &Track<'_>, law: &Law, found: &mut ControlIdentificat
         found.choices.push(("control.corners".to_owned(), value.to_owned(), reason));
     };
     let count = blended.len();
-    let arcs: Vec<&Corner> = blended.iter().filter(|corner| corner.radius > 0.0).collect();
-    let slowed: Vec<&Corner> =
+    let arcs: Vec<&LineCorner> = blended.iter().filter(|corner| corner.radius > 0.0).collect();
+    let slowed: Vec<&LineCorner> =
         blended.iter().filter(|corner| corner.speed < CORNER_SPEEDS[1] * corner.feed).collect();
     let steps: Vec<f64> = slowed.iter().map(|c| 2.0 * c.speed * (0.5 * c.turn).sin()).collect();
     if 2 * arcs.len() > count {
-        let within: Vec<&&Corner> = arcs.iter().filter(|corner| corner.tolerance().is_some()).collect();
+        let within: Vec<&&LineCorner> = arcs.iter().filter(|corner| corner.tolerance().is_some()).collect();
         let parts: Vec<f64> = within.iter().filter_map(|c| Some(c.distance() / c.tolerance()?)).collect();
-        let distance = Estimate::of(parts, 0.0);
+        let distance = ControlEstimate::of(parts, 0.0);
         choose(
             "arc",
             match distance {
@@ -147,17 +147,17 @@ fn identify_corners(track: &Track<'_>, law: &Law, found: &mut ControlIdentificat
         );
         let normal =
             slowed.iter().filter(|c| c.radius > 0.0).map(|c| c.speed * c.speed / (c.radius * c.limit));
-        if let Some(normal) = Estimate::of(normal.collect(), 5e-3) {
+        if let Some(normal) = ControlEstimate::of(normal.collect(), 5e-3) {
             found.push(
                 "control.normal_fraction",
-                Estimate { value: normal.value.min(1.0), ..normal },
+                ControlEstimate { value: normal.value.min(1.0), ..normal },
                 1.0,
                 "",
             );
         }
-        let open: Vec<&&Corner> = arcs.iter().filter(|corner| corner.tolerance().is_none()).collect();
+        let open: Vec<&&LineCorner> = arcs.iter().filter(|corner| corner.tolerance().is_none()).collect();
         let limited = open.iter().filter(|c| c.speed < CORNER_SPEEDS[1] * c.feed);
-        match Estimate::of(limited.map(|c| c.distance()).collect(), 5e-3) {
+        match ControlEstimate::of(limited.map(|c| c.distance()).collect(), 5e-3) {
             Some(tolerance) => found.push("control.corner_tolerance_mm", tolerance, 1e-3, "mm"),
             None if open.is_empty() => {
                 found.not_shown.push("deviation of G64 without P: no such corner".to_owned());
@@ -181,7 +181,7 @@ fn identify_corners(track: &Track<'_>, law: &Law, found: &mut ControlIdentificat
         return;
     }
     // Normal acceleration of an arc within P, as a part of the limit.
-    let normal = |corner: &&Corner| {
+    let normal = |corner: &&LineCorner| {
         corner.tolerance().map(|tolerance| corner.speed.powi(2) * corner.bulge() / (tolerance * corner.limit))
     };
     let normals: Vec<f64> = slowed.iter().filter_map(normal).collect();
@@ -200,7 +200,7 @@ fn identify_corners(track: &Track<'_>, law: &Law, found: &mut ControlIdentificat
                 100.0 * spreads[0]
             ),
         );
-        if let Some(step) = Estimate::of(steps, 2e-3) {
+        if let Some(step) = ControlEstimate::of(steps, 2e-3) {
             found.push("control.corner_velocity_m_min", step, METER_PER_MINUTE, "m/min");
         }
         return;
@@ -213,17 +213,22 @@ fn identify_corners(track: &Track<'_>, law: &Law, found: &mut ControlIdentificat
             100.0 * spreads[1]
         ),
     );
-    let Some(normal) = Estimate::of(normals, 5e-3) else { return };
+    let Some(normal) = ControlEstimate::of(normals, 5e-3) else { return };
     let open = slowed.iter().filter(|corner| corner.tolerance().is_none());
     let open = open.map(|c| c.speed.powi(2) * c.bulge() / (normal.value * c.limit));
-    if let Some(tolerance) = Estimate::of(open.collect(), 1e-2) {
+    if let Some(tolerance) = ControlEstimate::of(open.collect(), 1e-2) {
         found.push("control.corner_tolerance_mm", tolerance, 1e-3, "mm");
     }
-    found.push("control.normal_fraction", Estimate { value: normal.value.min(1.0), ..normal }, 1.0, "");
+    found.push(
+        "control.normal_fraction",
+        ControlEstimate { value: normal.value.min(1.0), ..normal },
+        1.0,
+        "",
+    );
 }
 
 /// Identifies the parts of the acceleration on arcs.
-fn identify_circles(track: &Track<'_>, law: &Law, found: &mut ControlIdentification) {
+fn identify_circles(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentification) {
     let period = track.log.period;
     let [mut normals, mut tangentials] = [Vec::new(), Vec::new()];
     for (index, motion) in track.motions.iter().enumerate() {
@@ -257,18 +262,21 @@ fn identify_circles(track: &Track<'_>, law: &Law, found: &mut ControlIdentificat
         tangentials.extend(acceleration.map(|a| a / limit));
     }
     found.values.retain(|value| value.key != "control.normal_fraction" || normals.is_empty());
-    match Estimate::of(normals, 2e-3) {
-        Some(e) => found.push("control.normal_fraction", Estimate { value: e.value.min(1.0), ..e }, 1.0, ""),
+    match ControlEstimate::of(normals, 2e-3) {
+        Some(e) => found.push("control.normal_fraction", ControlEstimate { value: e.value.min(1.0), ..e }, 1.0, ""),
         None => found.not_shown.push(
             "acceleration across the path on arcs: no arc from rest that limits the feed; it takes a higher feed or smaller \
              radii"
                 .to_owned(),
         ),
     }
-    match Estimate::of(tangentials, 2e-3) {
-        Some(e) => {
-            found.push("control.tangential_fraction", Estimate { value: e.value.min(1.0), ..e }, 1.0, "")
-        }
+    match ControlEstimate::of(tangentials, 2e-3) {
+        Some(e) => found.push(
+            "control.tangential_fraction",
+            ControlEstimate { value: e.value.min(1.0), ..e },
+            1.0,
+            "",
+        ),
         None => found
             .not_shown
             .push("acceleration along the path on arcs: no arc from rest to a constant speed".to_owned()),
@@ -276,7 +284,7 @@ fn identify_circles(track: &Track<'_>, law: &Law, found: &mut ControlIdentificat
 }
 
 /// Identifies block cycle and look-ahead.
-fn identify_blocks(track: &Track<'_>, law: &Law, found: &mut ControlIdentification) {
+fn identify_blocks(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentification) {
     let blocks = Blocks::of(track, law);
     let Some([cycle, ahead]) = blocks.bounds else {
         found.not_shown.push(
@@ -301,7 +309,7 @@ fn identify_blocks(track: &Track<'_>, law: &Law, found: &mut ControlIdentificati
 }
 
 /// Identifies the acceleration of motions before a standstill in G64, and beside corners in G61.
-fn identify_ends(track: &Track<'_>, law: &Law, found: &mut ControlIdentification) {
+fn identify_ends(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentification) {
     let [mut overlaps, mut kinks] = [Vec::new(), Vec::new()];
     let period = track.log.period;
     for (index, motion) in track.motions.iter().enumerate() {
@@ -334,9 +342,9 @@ fn identify_ends(track: &Track<'_>, law: &Law, found: &mut ControlIdentification
         let parts = if is_blended { &mut overlaps } else { &mut kinks };
         parts.extend(acceleration.map(|a| a / limit.value));
     }
-    match Estimate::of(overlaps, 2e-3) {
+    match ControlEstimate::of(overlaps, 2e-3) {
         Some(part) if part.value > 1.0 - WHOLE => {
-            found.push("control.overlap_fraction", Estimate { value: 1.0, ..part }, 1.0, "");
+            found.push("control.overlap_fraction", ControlEstimate { value: 1.0, ..part }, 1.0, "");
         }
         Some(part) => found.push("control.overlap_fraction", part, 1.0, ""),
         None => found.not_shown.push(
@@ -344,12 +352,12 @@ fn identify_ends(track: &Track<'_>, law: &Law, found: &mut ControlIdentification
                 .to_owned(),
         ),
     }
-    match Estimate::of(kinks, 2e-3) {
+    match ControlEstimate::of(kinks, 2e-3) {
         Some(part) if part.value > 1.0 - WHOLE => {
-            found.push("control.kink_fraction", Estimate { value: 1e-3, ..part }, 1.0, "");
+            found.push("control.kink_fraction", ControlEstimate { value: 1e-3, ..part }, 1.0, "");
         }
         Some(part) => {
-            found.push("control.kink_fraction", Estimate { value: 1.0 - part.value, ..part }, 1.0, "");
+            found.push("control.kink_fraction", ControlEstimate { value: 1.0 - part.value, ..part }, 1.0, "");
         }
         None => found.not_shown.push(
             "acceleration of motions beside a corner in G61: no such motion of one axis from rest to a constant speed"
@@ -367,10 +375,10 @@ fn identify_wait(track: &Track<'_>, found: &mut ControlIdentification) {
             waits.push(start.saturating_sub(end) as f64 * track.log.period - dwell);
         }
     }
-    match Estimate::of(waits, 0.0) {
+    match ControlEstimate::of(waits, 0.0) {
         Some(wait) => {
             let half_width = wait.half_width.max(track.log.period);
-            let wait = Estimate { value: wait.value.max(0.0), half_width, ..wait };
+            let wait = ControlEstimate { value: wait.value.max(0.0), half_width, ..wait };
             found.push("control.wait_ms", wait, MILLISECOND, "ms");
         }
         None => found.not_shown.push("wait at standstills: no dwell (G4) between two motions".to_owned()),
@@ -392,10 +400,10 @@ fn motion_time(track: &Track<'_>) -> f64 {
 /// Straight motions of single axes between rests.
 struct Axes<'a> {
     machine: &'a MachineConfig,
-    ramps: Vec<Vec<Ramp>>,
+    ramps: Vec<Vec<SpeedRamp>>,
     rapids: Vec<Vec<f64>>,
     moving: [bool; AXIS_COUNT],
-    law: Option<Law>,
+    law: Option<RampLaw>,
 }
 
 impl<'a> Axes<'a> {
@@ -432,7 +440,7 @@ impl<'a> Axes<'a> {
                 axes.rapids[axis].push(constant.step / track.log.period);
             }
         }
-        axes.law = Law::fit(&axes.ramps, track.log.period);
+        axes.law = RampLaw::fit(&axes.ramps, track.log.period);
         axes
     }
 
@@ -457,14 +465,14 @@ impl<'a> Axes<'a> {
                      at rapid traverse"
                 )),
             }
-            if let Some(Law { smoothing: Smoothing::Jerk(limits), .. }) = law {
+            if let Some(RampLaw { smoothing: Smoothing::Jerk(limits), .. }) = law {
                 match limits[axis] {
                     Some(j) if is_linear => found.push(key("jerk_m_s3"), j, 1.0, "m/s³"),
                     Some(j) => found.push(key("jerk_rev_s3"), j, REVOLUTION, "rev/s³"),
                     None => found.not_shown.push(format!("jerk of {letter}: no ramp of {letter} alone")),
                 }
             }
-            match Estimate::of(self.rapids[axis].clone(), 1e-4) {
+            match ControlEstimate::of(self.rapids[axis].clone(), 1e-4) {
                 Some(v) if is_linear => found.push(key("velocity_m_min"), v, METER_PER_MINUTE, "m/min"),
                 Some(v) => found.push(key("velocity_rpm"), v, RPM, "rpm"),
                 None => found.not_shown.push(format!(
@@ -473,27 +481,37 @@ impl<'a> Axes<'a> {
             }
         }
         let Some(law) = &self.law else { return };
+        let filters = match &law.smoothing {
+            Smoothing::Filters(stages) => stages.as_slice(),
+            _ => &[],
+        };
+        let mut choose = |key: &str, value: &str, reason: String| {
+            found.choices.push((key.to_owned(), value.to_owned(), reason));
+        };
         match &law.smoothing {
-            Smoothing::Filters(stages) => {
-                for (index, stage) in stages.iter().enumerate() {
-                    found.push(format!("control.filter_{}_ms", index + 1), *stage, MILLISECOND, "ms");
-                }
+            Smoothing::None(time) => choose(
+                "control.jerk_limited",
+                "false",
+                format!("the acceleration is constant, smoothed over {:.1} ms at most", 1e3 * time),
+            ),
+            Smoothing::Filters(_) => {
+                choose(
+                    "control.jerk_limited",
+                    "false",
+                    "all ramps are longer by the time of filters".to_owned(),
+                );
             }
-            Smoothing::None(time) => {
-                found.choices.push((
-                    "control.filter_1_ms".to_owned(),
-                    "0".to_owned(),
-                    format!(
-                        "the ramps are those of a constant acceleration, smoothed over {:.1} ms at most",
-                        1e3 * time
-                    ),
-                ));
-            }
-            Smoothing::Jerk(_) => found.choices.push((
-                "control.jerk_limited".to_owned(),
-                "true".to_owned(),
+            Smoothing::Jerk(_) => choose(
+                "control.jerk_limited",
+                "true",
                 "slow ramps are shorter than fast ones as with a jerk limit, not as with a filter".to_owned(),
-            )),
+            ),
+        }
+        for (index, key) in ["control.filter_1_ms", "control.filter_2_ms"].into_iter().enumerate() {
+            match filters.get(index) {
+                Some(stage) => found.push(key, *stage, MILLISECOND, "ms"),
+                None => found.choices.push((key.to_owned(), "0".to_owned(), String::new())),
+            }
         }
         if law.is_ambiguous {
             found.not_shown.push(

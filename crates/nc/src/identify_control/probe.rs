@@ -5,6 +5,10 @@ use std::fmt::Write;
 
 use virtual_axes_core::config::{AxisKind, MachineConfig};
 
+use crate::interpret::WorkOffset;
+use crate::motion::AXIS_LETTERS;
+use crate::offline::PartProgramOptions;
+
 /// Largest distance of a linear axis from the middle of the travel, m, and of a rotary one, rad.
 const REACH: [f64; 2] = [0.2, PI / 4.0];
 /// Speeds of single axes, as parts of the largest one.
@@ -35,14 +39,16 @@ struct ProbedAxis {
     acceleration: f64,
 }
 
-/// Returns a part program, in machine coordinates with all work offsets 0, whose setpoints show the profile of a control:
+/// Returns a part program in G54, with the work offsets of the machine or those given, whose setpoints show the profile of a control:
 /// motions of single axes at several feeds, corners of several angles and tolerances, circles, rows of short lines and
 /// standstills, within the travel of the axes.
 ///
 /// # Errors
 ///
-/// Returns an error if the machine lacks X or Y, or if their travel is too short.
-pub fn probe_program(machine: &MachineConfig) -> Result<String, String> {
+/// Returns an error if a work offset is invalid, if the machine lacks X or Y, or if their travel is too short.
+pub fn probe_program(machine: &MachineConfig, work_offsets: &[WorkOffset]) -> Result<String, String> {
+    let options = PartProgramOptions { work_offsets: work_offsets.to_vec(), ..PartProgramOptions::default() };
+    let offset = options.interpreter(machine)?.work_offsets[0];
     let axes: Vec<ProbedAxis> = machine
         .axes()
         .iter()
@@ -57,6 +63,8 @@ pub fn probe_program(machine: &MachineConfig) -> Result<String, String> {
                 true => (f64::midpoint(travel[0], travel[1]), most.min(0.45 * (travel[1] - travel[0]))),
                 false => (0.0_f64.clamp(travel[0], travel[1]), most),
             };
+            let index = AXIS_LETTERS.iter().position(|other| *other == letter)?;
+            let middle = middle - offset[index];
             let scale = if is_linear { 1e3 } else { 180.0 / PI };
             let (velocity, acceleration) = (limits.velocity, limits.acceleration);
             Some(ProbedAxis { letter, scale, middle, reach, velocity, acceleration })
@@ -85,12 +93,12 @@ pub fn probe_program(machine: &MachineConfig) -> Result<String, String> {
     for axis in &axes {
         line(format!("G0 {}{:.4}", axis.letter, axis.scale * axis.middle));
     }
-    line("G4 P0.3".to_owned());
+    line("G4 P0.2".to_owned());
     for axis in &axes {
         line(format!("(motions of {} alone)", axis.letter));
         let at = |position: f64| format!("{}{:.4}", axis.letter, axis.scale * (axis.middle + position));
         for side in [-1.0, 1.0, -1.0] {
-            line(format!("G0 {}\nG4 P0.3", at(side * axis.reach)));
+            line(format!("G0 {}\nG4 P0.2", at(side * axis.reach)));
         }
         for part in SPEEDS {
             let speed = part * axis.velocity;
@@ -101,10 +109,10 @@ pub fn probe_program(machine: &MachineConfig) -> Result<String, String> {
                 continue;
             }
             for end in [length, 0.0] {
-                line(format!("G1 {} F{feed:.3}\nG4 P0.3", at(end - axis.reach)));
+                line(format!("G1 {} F{feed:.3}\nG4 P0.2", at(end - axis.reach)));
             }
         }
-        line(format!("G64 P0.01\nG1 {} F{:.3}\nG4 P0.3\nG61", at(0.0), 6.0 * axis.scale * axis.velocity));
+        line(format!("G64 P0.01\nG1 {} F{:.3}\nG4 P0.2\nG61", at(0.0), 6.0 * axis.scale * axis.velocity));
     }
     let point = |dx: f64, dy: f64| format!("X{:.4} Y{:.4}", 1e3 * x.middle + dx, 1e3 * y.middle + dy);
     let fastest = x.velocity.min(y.velocity);
@@ -119,17 +127,17 @@ pub fn probe_program(machine: &MachineConfig) -> Result<String, String> {
             let (sine, cosine) = turn.to_radians().sin_cos();
             // The lines are on both sides of the middle.
             let start = [-0.5 * leg * (1.0 + cosine), -0.5 * leg * sine];
-            line(format!("G61 G0 {}\nG4 P0.3", point(start[0], start[1])));
+            line(format!("G61 G0 {}\nG4 P0.2", point(start[0], start[1])));
             line(format!("{mode} G1 {} F{feed:.3}", point(start[0] + leg, start[1])));
-            line(format!("G1 {}\nG4 P0.3", point(start[0] + leg * (1.0 + cosine), start[1] + leg * sine)));
+            line(format!("G1 {}\nG4 P0.2", point(start[0] + leg * (1.0 + cosine), start[1] + leg * sine)));
         }
     }
     line("G61 (circles)".to_owned());
     let feed = 60e3 * 0.7 * fastest;
     for radius in RADII {
-        line(format!("G0 {}\nG4 P0.3", point(-radius, 0.0)));
+        line(format!("G0 {}\nG4 P0.2", point(-radius, 0.0)));
         for code in ["G2", "G3"] {
-            line(format!("{code} {} I{radius} J0 F{feed:.3}\nG4 P0.3", point(-radius, 0.0)));
+            line(format!("{code} {} I{radius} J0 F{feed:.3}\nG4 P0.2", point(-radius, 0.0)));
         }
     }
     line("(rows of short lines)".to_owned());
@@ -137,11 +145,11 @@ pub fn probe_program(machine: &MachineConfig) -> Result<String, String> {
     for length in LINES {
         let count = MOST_LINES.min((ROW / length) as usize);
         let start = -0.5 * length * count as f64;
-        line(format!("G0 {}\nG4 P0.3\nG1 F{feed:.3}", point(start, 0.0)));
+        line(format!("G0 {}\nG4 P0.2\nG1 F{feed:.3}", point(start, 0.0)));
         for k in 1..=count {
             line(format!("X{:.4}", 1e3 * x.middle + start + length * k as f64));
         }
-        line("G4 P0.3".to_owned());
+        line("G4 P0.2".to_owned());
     }
     let _ = write!(text, "M2\n");
     Ok(text)

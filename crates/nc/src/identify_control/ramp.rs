@@ -4,9 +4,9 @@
 //! T = a/j, widen it by another box. The variance of boxes adds: 12 × variance = Σ L², and so does the fourth cumulant:
 //! −120 × cumulant = Σ L⁴. A sum over sampled positions, in place of their differences, keeps the influence of rounding low.
 
-/// Ramp from rest to a constant speed.
+/// SpeedRamp from rest to a constant speed.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Ramp {
+pub(super) struct SpeedRamp {
     /// Speed, in units of the places per second.
     pub speed: f64,
     /// Sum of the squares of the lengths of the boxes, s².
@@ -62,7 +62,7 @@ pub(super) fn plateau(places: &[f64], resolution: f64) -> Option<Plateau> {
 }
 
 /// Returns the ramp of places, which start at rest at 0, up to a part of constant speed.
-pub(super) fn ramp(places: &[f64], plateau: &Plateau, period: f64) -> Option<Ramp> {
+pub(super) fn ramp(places: &[f64], plateau: &Plateau, period: f64) -> Option<SpeedRamp> {
     let Plateau { ends: [from, to], step } = *plateau;
     // Sample, with its fraction, at which the straight line of constant speed starts at 0.
     let middle = usize::midpoint(from, to);
@@ -84,7 +84,7 @@ pub(super) fn ramp(places: &[f64], plateau: &Plateau, period: f64) -> Option<Ram
     // Linear interpolation between samples adds two boxes of one period.
     let squares = 12.0 * second - 2.0;
     let fourth_powers = -120.0 * (fourth - 3.0 * second * second) - 2.0;
-    Some(Ramp {
+    Some(SpeedRamp {
         speed: step / period,
         squares: squares * period.powi(2),
         fourth_powers: fourth_powers * period.powi(4),

@@ -14,14 +14,14 @@ const START_DISTANCE: f64 = 5e-5;
 /// Largest distance of a sample from its motion, m, besides a fifth of the motion.
 const MOST_DISTANCE: f64 = 5e-3;
 
-/// Motion of a program.
+/// TrackedMotion of a program.
 #[derive(Debug, Clone)]
-pub(super) struct Motion {
+pub(super) struct TrackedMotion {
     pub line: usize,
     pub from: Coordinates,
     pub to: Coordinates,
-    /// Arc with the indices of its axes, its radius and the angle of its start.
-    pub arc: Option<Arc>,
+    /// TrackedArc with the indices of its axes, its radius and the angle of its start.
+    pub arc: Option<TrackedArc>,
     /// Length, in the metric in which 1 rad of a rotary axis is 0.1 m.
     pub length: f64,
     /// Programmed feed, m/s or rad/s; infinite at rapid traverse.
@@ -33,7 +33,7 @@ pub(super) struct Motion {
 
 /// Circular arc.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Arc {
+pub(super) struct TrackedArc {
     pub plane: [usize; 2],
     pub center: [f64; 2],
     pub radius: f64,
@@ -50,7 +50,7 @@ pub(super) fn distance(a: &Coordinates, b: &Coordinates) -> f64 {
     (0..AXIS_COUNT).map(|i| (weight(i) * (a[i] - b[i])).powi(2)).sum::<f64>().sqrt()
 }
 
-impl Motion {
+impl TrackedMotion {
     fn new(motion: &ProgramMotion) -> Result<Option<Self>, String> {
         if motion.tcp_length.is_some() {
             return Err(format!(
@@ -71,7 +71,7 @@ impl Motion {
                 let others = across.map(|i| (weight(i) * (to[i] - from[i])).powi(2)).sum::<f64>().sqrt();
                 length = others.hypot(radius * arc.sweep);
                 let phase = offset[1].atan2(offset[0]);
-                Some(Arc { plane: [x, y], center: arc.center, radius, phase, sweep: arc.sweep })
+                Some(TrackedArc { plane: [x, y], center: arc.center, radius, phase, sweep: arc.sweep })
             }
             MotionKind::Nurbs(_) => {
                 return Err(format!("line {}: splines (G5.2) are not supported", motion.line));
@@ -148,7 +148,7 @@ impl Motion {
 #[derive(Debug)]
 pub(super) struct Track<'a> {
     pub log: &'a ControlLog,
-    pub motions: Vec<Motion>,
+    pub motions: Vec<TrackedMotion>,
     /// Samples of each motion: the first one, and the one behind the last.
     pub samples: Vec<[usize; 2]>,
     /// True if the axes do not move from this sample to the next one.
@@ -158,11 +158,11 @@ pub(super) struct Track<'a> {
 /// Returns the motions of a program.
 pub(super) fn motions<E: std::fmt::Display>(
     steps: impl Iterator<Item = Result<ProgramStep, E>>,
-) -> Result<Vec<Motion>, String> {
-    let mut motions: Vec<Motion> = Vec::new();
+) -> Result<Vec<TrackedMotion>, String> {
+    let mut motions: Vec<TrackedMotion> = Vec::new();
     for step in steps {
         match step.map_err(|error| error.to_string())? {
-            ProgramStep::Motion(motion) => motions.extend(Motion::new(&motion)?),
+            ProgramStep::Motion(motion) => motions.extend(TrackedMotion::new(&motion)?),
             ProgramStep::Event { event: ProgramEvent::Dwell(time) | ProgramEvent::Pause(time), .. } => {
                 if let Some(last) = motions.last_mut() {
                     *last.dwell.get_or_insert(0.0) += time;
@@ -181,7 +181,7 @@ impl<'a> Track<'a> {
     /// # Errors
     ///
     /// Returns an error if the log is not one of the program.
-    pub fn new(log: &'a ControlLog, motions: Vec<Motion>) -> Result<Self, String> {
+    pub fn new(log: &'a ControlLog, motions: Vec<TrackedMotion>) -> Result<Self, String> {
         let Some(first) = motions.first() else { return Err("the program has no motion".to_owned()) };
         for (axis, letter) in AXIS_LETTERS.iter().enumerate() {
             let moves =
@@ -272,7 +272,7 @@ impl<'a> Track<'a> {
         let near = |sample: usize, point: &Coordinates| {
             distance(&self.log.positions[sample], point) <= 1e-7 + 4.0 * self.log.resolution
         };
-        let Motion { from, to, .. } = &self.motions[motion];
+        let TrackedMotion { from, to, .. } = &self.motions[motion];
         let before = (first.saturating_sub(REACH)..=first + REACH)
             .filter(|&i| i >= 1 && i < end && rests(i - 1) && near(i, from))
             .max()
@@ -301,7 +301,7 @@ impl<'a> Track<'a> {
     }
 }
 
-impl Motion {
+impl TrackedMotion {
     /// Returns true if an arc moves an axis.
     fn moves(&self, axis: usize) -> bool {
         self.arc.is_some_and(|arc| arc.plane.contains(&axis))

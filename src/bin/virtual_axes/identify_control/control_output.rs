@@ -52,7 +52,7 @@ impl ControlOutput<'_> {
         });
         let table = Table { rows: rows.collect(), ..Table::new("", &columns) };
         text += &text_table::aligned(&table, &[0, 3]);
-        for (key, value, reason) in &self.found.choices {
+        for (key, value, reason) in self.found.choices.iter().filter(|(_, _, reason)| !reason.is_empty()) {
             text += &text_table::wrapped_line(&format!("{key} = {value}: {reason}"));
         }
         for missing in &self.found.not_shown {

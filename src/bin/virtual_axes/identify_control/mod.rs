@@ -160,7 +160,11 @@ fn set_values(parameters: &mut Parameters, found: &ControlIdentification) -> Res
         parameters.set_text(&format!("{key}={value}"), &source)?;
     }
     for value in &found.values {
-        parameters.set_text(&format!("{}={:.9e}", value.key, value.value), &source)?;
+        let text = match value.key.as_str() {
+            "control.look_ahead" => format!("{:.0}", value.value),
+            _ => format!("{:.9e}", value.value),
+        };
+        parameters.set_text(&format!("{}={text}", value.key), &source)?;
     }
     Ok(())
 }
