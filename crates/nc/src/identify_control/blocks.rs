@@ -5,8 +5,9 @@ use super::track::Track;
 
 /// Fewest lines of a row.
 const LEAST_LINES: usize = 20;
-/// Parts of a row between which its speed is measured.
+/// Parts of a row between which its speed is measured, and the one from which on it is constant.
 const PARTS: [f64; 2] = [0.4, 0.6];
+const CONSTANT_FROM: f64 = 0.3;
 /// Relative difference of equal figures.
 const SAME: f64 = 0.02;
 
@@ -54,7 +55,7 @@ impl Blocks {
         let largest = counts.iter().copied().fold(0.0, f64::max);
         let alike: Vec<f64> =
             counts.into_iter().filter(|count| *count > largest * (1.0 - 4.0 * SAME)).collect();
-        if !alike.is_empty() && (alike.len() > 1 || blocks.cycle.is_some()) {
+        if alike.len() > 1 {
             blocks.look_ahead = ControlEstimate::of(alike, SAME);
         }
         blocks
@@ -94,10 +95,10 @@ fn rows(track: &Track<'_>, law: &RampLaw) -> Vec<Row> {
                 let fraction = (part * total - places[before]) / (places[after] - places[before]);
                 Some((before as f64 + fraction) * track.log.period)
             };
-            if let [Some(from), Some(to)] = PARTS.map(time) {
+            if let [Some(early), Some(from), Some(to)] = [CONSTANT_FROM, PARTS[0], PARTS[1]].map(time) {
                 let speed = scale * total * (PARTS[1] - PARTS[0]) / (to - from);
-                let reachable = (acceleration.value * 0.8 * scale * total).sqrt();
-                let is_free = speed > (1.0 - SAME) * start.feed || speed > 0.9 * reachable;
+                let before = scale * total * (PARTS[0] - CONSTANT_FROM) / (from - early);
+                let is_free = speed > (1.0 - SAME) * start.feed || (before / speed - 1.0).abs() > SAME;
                 rows.push(Row {
                     length: start.length * scale,
                     speed,

@@ -6,7 +6,7 @@
 
 use super::law::{RampLaw, Smoothing};
 use super::ramp::plateau;
-use super::track::{Track, distance};
+use super::track::{Track, TrackedMotion, distance};
 use crate::motion::{AXIS_COUNT, Coordinates, PathControl};
 
 /// Smallest and largest change of direction of a corner, rad.
@@ -14,9 +14,10 @@ const TURNS: [f64; 2] = [0.1, 3.0];
 /// Relative difference of the speeds of the lines.
 const SAME_SPEED: f64 = 1e-3;
 /// Number of halvings of a search.
-const HALVINGS: usize = 60;
-/// Steps of an integral over a filter.
-const STEPS: usize = 400;
+const HALVINGS: usize = 40;
+/// Steps of an integral over a filter, and number of times that a range loses a third in the search of a minimum.
+const STEPS: usize = 300;
+const THIRDS: usize = 25;
 
 /// LineCorner of two lines with the same feed.
 #[derive(Debug, Clone, Copy)]
@@ -81,14 +82,19 @@ impl LineCorner {
         let jerks = [along(&directions[0], &jerk)?, along(&directions[1], &jerk)?];
         let moving = (0..AXIS_COUNT).filter(|&i| directions.iter().any(|direction| direction[i] != 0.0));
         let limit = moving.filter_map(acceleration).fold(f64::INFINITY, f64::min);
-        let lines = Lines { turn, feed, lost: lost.max(0.0), accelerations, jerks };
+        let lines = Lines { turn, feed, lost, accelerations, jerks };
         let filters = law.filters();
         let most = 0.5 * first.length.min(second.length) / (0.5 * turn).tan();
         let path = |radius: f64| lines.distance(radius, lines.speed(radius), &filters);
         // The influence of the sampling on the distance of an exact corner.
-        let tolerance = 2.0 * resolution + 3e-7 + 0.05 * path(0.0);
+        let tolerance = 2.0 * resolution + 2e-7 + 2e-3 * path(0.0);
         let mut radius = 0.0;
-        if reached > path(0.0) + tolerance {
+        // Without filters the exact path has a bend between two samples.
+        let leaves = match filters.is_empty() {
+            true => off_lines(&track.log.positions[before..=after], [first, second]) > tolerance,
+            false => reached > path(0.0) + tolerance,
+        };
+        if leaves {
             let [mut low, mut high] = [0.0, most];
             for _ in 0..HALVINGS {
                 let middle = f64::midpoint(low, high);
@@ -154,36 +160,60 @@ impl Lines {
         high
     }
 
-    /// Returns the distance of the filtered path from the corner: the mean of the component towards the inside.
+    /// Returns the distance of the filtered path from the corner, m.
     fn distance(&self, radius: f64, speed: f64, filters: &[f64]) -> f64 {
-        let half = 0.5 * self.turn;
-        let arc_time = radius * half / speed.max(f64::MIN_POSITIVE);
-        let a = 0.5 * (self.accelerations[0] + self.accelerations[1]);
-        let inside = |time: f64| {
-            if time < arc_time {
-                return radius / half.cos() - radius * (speed * time / radius).cos();
+        let (sine, cosine) = (0.5 * self.turn).sin_cos();
+        let arc_time = 0.5 * radius * self.turn / speed.max(f64::MIN_POSITIVE);
+        // Towards the inside of the corner, and from one line to the other.
+        let path = |time: f64| {
+            let away = time.abs() - arc_time;
+            if away < 0.0 {
+                let (s, c) = (speed * time / radius).sin_cos();
+                return [radius / cosine - radius * c, radius * s];
             }
-            let time = time - arc_time;
-            let ramp = ((self.feed - speed) / a).min(time);
-            let line = speed * time + a * ramp * (time - 0.5 * ramp);
-            (radius * half.tan() + line) * half.sin()
+            let a = self.accelerations[usize::from(time > 0.0)];
+            let ramp = ((self.feed - speed) / a).min(away);
+            let line = radius * sine / cosine + speed * away + a * ramp * (away - 0.5 * ramp);
+            [line * sine, time.signum() * line * cosine]
         };
         let [long, short] = match *filters {
-            [] => return inside(0.0),
+            [] => return path(0.0)[0],
             [one] => [one, 0.0],
             [a, b, ..] => [a.max(b), a.min(b)],
         };
         let [outer, inner] = [0.5 * (long + short), 0.5 * (long - short)];
-        let step = outer / STEPS as f64;
-        let (mut sum, mut weights) = (0.0, 0.0);
-        for k in 0..STEPS {
-            let time = (k as f64 + 0.5) * step;
-            let weight = if time <= inner { 1.0 } else { (outer - time) / (outer - inner) };
-            sum += weight * inside(time);
-            weights += weight;
+        let weight = |time: f64| if time <= inner { 1.0 } else { (outer - time) / (outer - inner) };
+        let times: Vec<f64> = (0..STEPS).map(|k| ((2 * k + 1) as f64 / STEPS as f64 - 1.0) * outer).collect();
+        let weights: Vec<f64> = times.iter().map(|time| weight(time.abs())).collect();
+        let total: f64 = weights.iter().sum();
+        let away = |center: f64| {
+            let mut sum = [0.0; 2];
+            for (time, weight) in times.iter().zip(&weights) {
+                let [inside, along] = path(center + time);
+                (sum[0], sum[1]) = (sum[0] + weight * inside, sum[1] + weight * along);
+            }
+            sum[0].hypot(sum[1]) / total
+        };
+        // The distance has one minimum, near the middle.
+        let [mut low, mut high] = [-0.5 * outer, 0.5 * outer];
+        for _ in 0..THIRDS {
+            let third = (high - low) / 3.0;
+            if away(low + third) < away(high - third) { high -= third } else { low += third }
         }
-        sum / weights
+        away(f64::midpoint(low, high))
     }
+}
+
+/// Returns the largest distance of samples from the nearer one of two lines.
+fn off_lines(positions: &[Coordinates], lines: [&TrackedMotion; 2]) -> f64 {
+    let away = |position: &Coordinates| {
+        let of = |line: &TrackedMotion| {
+            let place = line.place(position, 0.0).clamp(0.0, line.length);
+            distance(position, &line.position(place))
+        };
+        of(lines[0]).min(of(lines[1]))
+    };
+    positions.iter().map(away).fold(0.0, f64::max)
 }
 
 /// Returns the smallest distance of a sampled path from a point; parabolas join the samples.

@@ -22,6 +22,10 @@ const OF_PERIOD: f64 = 0.1;
 const INTERPOLATION: f64 = 3.0;
 /// Ratio of residuals from which one model is better than another.
 const BETTER: f64 = 0.25;
+/// Relative difference of the squares of equal ramps.
+const SAME_RAMP: f64 = 0.01;
+/// Part of the squares of a ramp that filters leave to its acceleration.
+const LEAST_SHARE: f64 = 0.1;
 /// Smallest ratio of the stages of a filter.
 const LEAST_STAGE: f64 = 0.05;
 
@@ -102,8 +106,11 @@ fn jerk_squares(speed: f64, acceleration: f64, jerk: f64) -> f64 {
     }
 }
 
-/// Returns the acceleration of a ramp with a known jerk limit; `None` if it is not reached.
-pub(super) fn jerk_limited_acceleration(ramp: &SpeedRamp, jerk: f64) -> Option<f64> {
+/// Returns the acceleration of a ramp with a known jerk limit, at most `limit`; `None` if it does not reach its acceleration.
+fn jerk_limited_acceleration(ramp: &SpeedRamp, jerk: f64, limit: f64) -> Option<f64> {
+    if (ramp.squares / jerk_squares(ramp.speed, limit, jerk) - 1.0).abs() < SAME_RAMP {
+        return Some(limit);
+    }
     // (v/a)² + (a/j)² is smallest, 2 v/j, where the acceleration is just reached.
     let half = 0.5 * ramp.squares * jerk * jerk;
     let root = half * half - (ramp.speed * jerk).powi(2);
@@ -241,8 +248,37 @@ impl RampLaw {
         Some(law)
     }
 
+    /// Returns the acceleration of a ramp of axes, at most the smallest of their limits; `None` if filters or jerk limit hide
+    /// it.
+    pub fn acceleration(&self, ramp: &SpeedRamp, axes: &[usize]) -> Option<f64> {
+        let least = |limits: &[Option<ControlEstimate>]| {
+            axes.iter().try_fold(f64::INFINITY, |least, &axis| Some(least.min(limits[axis]?.value)))
+        };
+        match &self.smoothing {
+            Smoothing::Jerk(jerks) => {
+                jerk_limited_acceleration(ramp, least(jerks)?, least(&self.accelerations)?)
+            }
+            _ => {
+                let square = ramp.squares - self.filter_squares();
+                (square > LEAST_SHARE * ramp.squares).then(|| ramp.speed / square.sqrt())
+            }
+        }
+    }
+
+    /// Returns the duration of a ramp of an axis before the filters, s.
+    pub fn ramp_time(&self, axis: usize, speed: f64) -> Option<f64> {
+        let a = self.accelerations[axis]?.value;
+        Some(match &self.smoothing {
+            Smoothing::Jerk(jerks) => {
+                let jerk_time = (a / jerks[axis]?.value).min((speed / jerks[axis]?.value).sqrt());
+                jerk_time + (speed / a).max(jerk_time)
+            }
+            _ => speed / a,
+        })
+    }
+
     /// Returns the sum of squares of the filters, s².
-    pub fn filter_squares(&self) -> f64 {
+    fn filter_squares(&self) -> f64 {
         match &self.smoothing {
             Smoothing::None(time) => time * time,
             Smoothing::Filters(stages) => stages.iter().map(|stage| stage.value.powi(2)).sum(),

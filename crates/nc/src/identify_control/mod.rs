@@ -25,7 +25,7 @@ use self::blocks::Blocks;
 use self::corner::LineCorner;
 use self::law::{ControlEstimate, RampLaw, Smoothing};
 use self::ramp::{SpeedRamp, plateau, ramp};
-use self::track::{Track, motions};
+use self::track::{Track, TrackedMotion, motions};
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, PathControl, ProgramStep};
 
 /// Identified parameter.
@@ -92,7 +92,7 @@ pub fn identify_control<E: std::fmt::Display>(
         identify_blocks(&track, law, &mut found);
         identify_ends(&track, law, &mut found);
     }
-    identify_wait(&track, &mut found);
+    identify_wait(&track, axes.law.as_ref(), &mut found);
     Ok(found)
 }
 
@@ -244,21 +244,7 @@ fn identify_circles(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentif
             normals.push(speed * speed / (arc.radius * limit));
         }
         let Some(ramp) = ramp(&places, &constant, period) else { continue };
-        let acceleration = match &law.smoothing {
-            Smoothing::Jerk(jerks) => {
-                let jerk = arc
-                    .plane
-                    .iter()
-                    .filter_map(|&axis| Some(jerks[axis]?.value))
-                    .fold(f64::INFINITY, f64::min);
-                law::jerk_limited_acceleration(&ramp, jerk)
-            }
-            _ => {
-                let square = ramp.squares - law.filter_squares();
-                // The filters must not hide the ramp.
-                (square > 0.1 * ramp.squares).then(|| speed / square.sqrt())
-            }
-        };
+        let acceleration = law.acceleration(&ramp, &arc.plane);
         tangentials.extend(acceleration.map(|a| a / limit));
     }
     found.values.retain(|value| value.key != "control.normal_fraction" || normals.is_empty());
@@ -331,14 +317,7 @@ fn identify_ends(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentifica
         let places: Vec<f64> = places.iter().map(|place| place * scale).collect();
         let Some(constant) = plateau(&places, track.log.resolution) else { continue };
         let Some(ramp) = ramp(&places, &constant, period) else { continue };
-        let acceleration = match &law.smoothing {
-            Smoothing::Jerk(jerks) => {
-                jerks[axis].and_then(|j| law::jerk_limited_acceleration(&ramp, j.value))
-            }
-            _ => Some(ramp.squares - law.filter_squares())
-                .filter(|square| *square > 0.1 * ramp.squares)
-                .map(|square| ramp.speed / square.sqrt()),
-        };
+        let acceleration = law.acceleration(&ramp, &[axis]);
         let parts = if is_blended { &mut overlaps } else { &mut kinks };
         parts.extend(acceleration.map(|a| a / limit.value));
     }
@@ -366,22 +345,42 @@ fn identify_ends(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentifica
     }
 }
 
-/// Identifies the wait at standstills.
-fn identify_wait(track: &Track<'_>, found: &mut ControlIdentification) {
-    let mut waits = Vec::new();
-    for index in 0..track.motions.len().saturating_sub(1) {
-        let Some(dwell) = track.motions[index].dwell else { continue };
-        if let ([_, Some(end)], [Some(start), _]) = (track.rests(index), track.rests(index + 1)) {
-            waits.push(start.saturating_sub(end) as f64 * track.log.period - dwell);
+/// Identifies the wait at standstills: the time between two ramps of single axes, less what they and the dwell last. Filters
+/// delay both ramps alike.
+fn identify_wait(track: &Track<'_>, law: Option<&RampLaw>, found: &mut ControlIdentification) {
+    let period = track.log.period;
+    // Times at which the line of constant speed starts at the start of the motion, and reaches its end.
+    let ends = |index: usize| {
+        let motion = track.motions.get(index)?;
+        let axis = motion.single_axis()?;
+        let [start, end] = track.samples[index];
+        let places = track.places(index, start..end);
+        let constant = plateau(&places, track.log.resolution)?;
+        let middle = usize::midpoint(constant.ends[0], constant.ends[1]);
+        let at = |place: f64| (start + middle) as f64 + (place - places[middle]) / constant.step;
+        let speed = constant.step / period * (motion.to[axis] - motion.from[axis]).abs() / motion.length;
+        Some((at(0.0) * period, at(motion.length) * period, 0.5 * law?.ramp_time(axis, speed)?))
+    };
+    let filters: f64 = law.map_or(0.0, |law| law.filters().iter().sum());
+    let waits = (0..track.motions.len()).filter_map(|index| {
+        let dwell = track.motions[index].dwell?;
+        let is_blended = |motion: &TrackedMotion| matches!(motion.path_control, PathControl::Blend(_));
+        let pair = [track.motions.get(index)?, track.motions.get(index + 1)?];
+        if pair.into_iter().any(|motion| is_blended(motion) && motion.feed.is_finite()) {
+            return None;
         }
-    }
-    match ControlEstimate::of(waits, 0.0) {
+        let ((_, end, braking), (start, _, starting)) = (ends(index)?, ends(index + 1)?);
+        Some(start - starting - end - braking - dwell - filters)
+    });
+    match ControlEstimate::of(waits.collect(), 0.0) {
         Some(wait) => {
-            let half_width = wait.half_width.max(track.log.period);
+            let half_width = wait.half_width.max(0.1 * period);
             let wait = ControlEstimate { value: wait.value.max(0.0), half_width, ..wait };
             found.push("control.wait_ms", wait, MILLISECOND, "ms");
         }
-        None => found.not_shown.push("wait at standstills: no dwell (G4) between two motions".to_owned()),
+        None => found.not_shown.push(
+            "wait at standstills: no dwell (G4) between two motions of single axes in G61 or at rapid traverse".to_owned(),
+        ),
     }
 }
 

@@ -24,7 +24,7 @@ const TURNS: [f64; 5] = [30.0, 60.0, 90.0, 120.0, 150.0];
 /// Radii of circles, mm.
 const RADII: [f64; 4] = [3.0, 6.0, 12.0, 25.0];
 /// Lengths of short lines, mm, largest length of a row, mm, and largest number of its lines.
-const LINES: [f64; 6] = [0.02, 0.05, 0.1, 0.2, 0.5, 1.0];
+const LINES: [f64; 8] = [0.02, 0.03, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0];
 const ROW: f64 = 80.0;
 const MOST_LINES: usize = 300;
 
@@ -112,7 +112,7 @@ pub fn probe_program(machine: &MachineConfig, work_offsets: &[WorkOffset]) -> Re
                 line(format!("G1 {} F{feed:.3}\nG4 P0.2", at(end - axis.reach)));
             }
         }
-        line(format!("G64 P0.01\nG1 {} F{:.3}\nG4 P0.2\nG61", at(0.0), 6.0 * axis.scale * axis.velocity));
+        line(format!("G64 P0.01\nG1 {} F{:.3}\nG4 P0.2\nG61", at(0.0), 24.0 * axis.scale * axis.velocity));
     }
     let point = |dx: f64, dy: f64| format!("X{:.4} Y{:.4}", 1e3 * x.middle + dx, 1e3 * y.middle + dy);
     let fastest = x.velocity.min(y.velocity);
