@@ -26,6 +26,8 @@ const BETTER: f64 = 0.25;
 const SAME_RAMP: f64 = 0.01;
 /// Part of the squares of a ramp that filters leave to its acceleration.
 const LEAST_SHARE: f64 = 0.1;
+/// Jerk limits from which a search starts, as multiples of the acceleration over the time of a filter.
+const JERK_STARTS: [f64; 6] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0];
 /// Smallest ratio of the stages of a filter.
 const LEAST_STAGE: f64 = 0.05;
 
@@ -127,18 +129,17 @@ fn fit_jerk(ramps: &[SpeedRamp], period: f64, start: [f64; 2]) -> Option<Fit> {
         };
         ramps.iter().map(of).collect()
     };
+    let derivative = |logs: [f64; 2], at: &[f64], k: usize| -> Vec<f64> {
+        let mut moved = logs;
+        moved[k] += 1e-6;
+        residuals(moved).iter().zip(at).map(|(a, b)| (a - b) / 1e-6).collect()
+    };
     let square = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>();
     let mut logs = start.map(f64::ln);
     let mut damping = 1e-3;
     let mut best = residuals(logs);
     for _ in 0..200 {
-        let derivative = |k: usize| {
-            let mut moved = logs;
-            moved[k] += 1e-6;
-            let moved = residuals(moved);
-            moved.iter().zip(&best).map(|(a, b)| (a - b) / 1e-6).collect::<Vec<_>>()
-        };
-        let columns = [derivative(0), derivative(1)];
+        let columns = [0, 1].map(|k| derivative(logs, &best, k));
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         let [a, b, c] =
             [dot(&columns[0], &columns[0]), dot(&columns[0], &columns[1]), dot(&columns[1], &columns[1])];
@@ -154,13 +155,24 @@ fn fit_jerk(ramps: &[SpeedRamp], period: f64, start: [f64; 2]) -> Option<Fit> {
             damping *= 4.0;
         }
         if step.iter().all(|x| x.abs() < 1e-9) || damping > 1e12 {
-            let rows: Vec<_> =
-                (0..ramps.len()).map(|i| (vec![columns[0][i], columns[1][i]], best[i])).collect();
-            let covariance = least_squares(&rows, 2)?.covariance;
-            return Some(Fit { residual: square(&best), values: DVector::from_row_slice(&logs), covariance });
+            break;
         }
     }
-    None
+    let columns = [0, 1].map(|k| derivative(logs, &best, k));
+    let rows: Vec<_> = (0..ramps.len()).map(|i| (vec![columns[0][i], columns[1][i]], best[i])).collect();
+    let covariance = match least_squares(&rows, 2) {
+        Some(fit) => fit.covariance,
+        None => {
+            // No ramp reaches the acceleration: the jerk limit alone, and the least acceleration with which that is so.
+            let fastest = ramps.iter().map(|ramp| ramp.speed).fold(0.0, f64::max);
+            logs[0] = 0.5 * (fastest.ln() + logs[1]);
+            let alone: Vec<_> =
+                columns[1].iter().zip(&best).map(|(slope, error)| (vec![*slope], *error)).collect();
+            let variance = least_squares(&alone, 1)?.covariance[(0, 0)];
+            DMatrix::from_row_slice(2, 2, &[f64::INFINITY, 0.0, 0.0, variance])
+        }
+    };
+    Some(Fit { residual: square(&best), values: DVector::from_row_slice(&logs), covariance })
 }
 
 impl RampLaw {
@@ -219,8 +231,10 @@ impl RampLaw {
             .iter()
             .map(|&axis| {
                 let a = law.accelerations[axis].map_or(1.0, |a| a.value);
-                let starts = [1.0, 0.3, 3.0].map(|factor| [a, factor * a / squares.sqrt()]);
-                let fits = starts.iter().filter_map(|start| fit_jerk(&ramps[axis], period, *start));
+                let starts = JERK_STARTS
+                    .iter()
+                    .flat_map(|factor| [1.0, 1.5].map(|part| [part * a, factor * a / squares.sqrt()]));
+                let fits = starts.filter_map(|start| fit_jerk(&ramps[axis], period, start));
                 fits.min_by(|a, b| a.residual.total_cmp(&b.residual))
             })
             .collect();

@@ -92,12 +92,14 @@ pub fn identify_control<E: std::fmt::Display>(
         identify_blocks(&track, law, &mut found);
         identify_ends(&track, law, &mut found);
     }
-    identify_wait(&track, axes.law.as_ref(), &mut found);
+    identify_wait(&track, &axes, &mut found);
     Ok(found)
 }
 
 /// Relative difference up to which a part is a whole.
 const WHOLE: f64 = 0.015;
+/// Relative difference of equal speeds.
+const SAME_SPEED: f64 = 5e-3;
 /// Part of the feed below which a corner is a stop, and above which it does not slow down.
 const CORNER_SPEEDS: [f64; 2] = [0.02, 0.97];
 
@@ -347,7 +349,7 @@ fn identify_ends(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentifica
 
 /// Identifies the wait at standstills: the time between two ramps of single axes, less what they and the dwell last. Filters
 /// delay both ramps alike.
-fn identify_wait(track: &Track<'_>, law: Option<&RampLaw>, found: &mut ControlIdentification) {
+fn identify_wait(track: &Track<'_>, axes: &Axes<'_>, found: &mut ControlIdentification) {
     let period = track.log.period;
     // Times at which the line of constant speed starts at the start of the motion, and reaches its end.
     let ends = |index: usize| {
@@ -359,9 +361,10 @@ fn identify_wait(track: &Track<'_>, law: Option<&RampLaw>, found: &mut ControlId
         let middle = usize::midpoint(constant.ends[0], constant.ends[1]);
         let at = |place: f64| (start + middle) as f64 + (place - places[middle]) / constant.step;
         let speed = constant.step / period * (motion.to[axis] - motion.from[axis]).abs() / motion.length;
-        Some((at(0.0) * period, at(motion.length) * period, 0.5 * law?.ramp_time(axis, speed)?))
+        let ramp = axes.law.as_ref()?.ramp_time(axis, speed)?;
+        axes.reaches(axis, motion, speed).then(|| (at(0.0) * period, at(motion.length) * period, 0.5 * ramp))
     };
-    let filters: f64 = law.map_or(0.0, |law| law.filters().iter().sum());
+    let filters: f64 = axes.law.as_ref().map_or(0.0, |law| law.filters().iter().sum());
     let waits = (0..track.motions.len()).filter_map(|index| {
         let dwell = track.motions[index].dwell?;
         let is_blended = |motion: &TrackedMotion| matches!(motion.path_control, PathControl::Blend(_));
@@ -400,6 +403,8 @@ fn motion_time(track: &Track<'_>) -> f64 {
 struct Axes<'a> {
     machine: &'a MachineConfig,
     ramps: Vec<Vec<SpeedRamp>>,
+    /// Programmed feeds of the ramps.
+    feeds: Vec<Vec<f64>>,
     rapids: Vec<Vec<f64>>,
     moving: [bool; AXIS_COUNT],
     law: Option<RampLaw>,
@@ -410,6 +415,7 @@ impl<'a> Axes<'a> {
         let mut axes = Self {
             machine,
             ramps: vec![Vec::new(); AXIS_COUNT],
+            feeds: vec![Vec::new(); AXIS_COUNT],
             rapids: vec![Vec::new(); AXIS_COUNT],
             moving: [false; AXIS_COUNT],
             law: None,
@@ -428,19 +434,47 @@ impl<'a> Axes<'a> {
             let places = track.places(index, before.saturating_sub(5)..(after + 6).min(log_end(track)));
             let places: Vec<f64> = places.iter().map(|place| place * scale).collect();
             let Some(constant) = plateau(&places, track.log.resolution) else { continue };
-            axes.ramps[axis].extend(ramp(&places, &constant, track.log.period));
+            let start = ramp(&places, &constant, track.log.period);
             let last = places.len() - 1;
             let length = motion.length * scale;
             let reversed: Vec<f64> = places.iter().rev().map(|place| length - place).collect();
             let constant =
                 ramp::Plateau { ends: [last - constant.ends[1], last - constant.ends[0]], ..constant };
-            axes.ramps[axis].extend(ramp(&reversed, &constant, track.log.period));
+            let (Some(start), Some(end)) = (start, ramp(&reversed, &constant, track.log.period)) else {
+                continue;
+            };
+            axes.ramps[axis].extend([start, end]);
+            let speed = constant.step / track.log.period;
+            axes.feeds[axis].extend([motion.feed; 2]);
             if motion.feed.is_infinite() {
-                axes.rapids[axis].push(constant.step / track.log.period);
+                axes.rapids[axis].push(speed);
             }
         }
+        axes.drop_short();
         axes.law = RampLaw::fit(&axes.ramps, track.log.period);
         axes
+    }
+
+    /// Drops motions that do not reach their feed: filters make one of a shorter motion a part of constant speed as well.
+    fn drop_short(&mut self) {
+        for axis in 0..AXIS_COUNT {
+            let rapid = self.rapids[axis].iter().copied().fold(0.0, f64::max);
+            self.rapids[axis].retain(|speed| *speed > (1.0 - SAME_SPEED) * rapid);
+            let feeds = std::mem::take(&mut self.feeds[axis]);
+            let mut feeds = feeds.iter();
+            self.ramps[axis].retain(|ramp| {
+                feeds.next().is_some_and(|feed| {
+                    ramp.speed
+                        > (1.0 - SAME_SPEED) * feed.min(if rapid > 0.0 { rapid } else { f64::INFINITY })
+                })
+            });
+        }
+    }
+
+    /// Returns true if a motion of one axis reaches its feed.
+    fn reaches(&self, axis: usize, motion: &TrackedMotion, speed: f64) -> bool {
+        let rapid = self.rapids[axis].first().copied().unwrap_or(f64::INFINITY);
+        speed > (1.0 - SAME_SPEED) * motion.feed.min(rapid)
     }
 
     fn identify(&self, found: &mut ControlIdentification) {
@@ -457,6 +491,12 @@ impl<'a> Axes<'a> {
             let key = |name: &str| format!("{}.limits.{name}", config.name());
             let law = self.law.as_ref();
             match law.and_then(|law| law.accelerations[axis]) {
+                Some(a) if a.half_width.is_infinite() => {
+                    let (name, unit) =
+                        if is_linear { ("acceleration_m_s2", 1.0) } else { ("acceleration_rev_s2", REVOLUTION) };
+                    let reason = "at least this: no ramp reaches it within the jerk limit".to_owned();
+                    found.choices.push((key(name), format!("{:.6}", a.value / unit), reason));
+                }
                 Some(a) if is_linear => found.push(key("acceleration_m_s2"), a, 1.0, "m/s²"),
                 Some(a) => found.push(key("acceleration_rev_s2"), a, REVOLUTION, "rev/s²"),
                 None => found.not_shown.push(format!(
