@@ -108,7 +108,8 @@ pub fn run(arguments: &IdentifyControlArguments) -> Result<String, Box<dyn Error
         );
         let comment = |key: &str| {
             let value = found.values.iter().find(|value| value.key == key)?;
-            Some(format!("± {} {}", control_output::significant(value.half_width, 2), value.unit))
+            let text = format!("± {} {}", control_output::significant(value.half_width, 2), value.unit);
+            Some(text.trim_end().to_owned())
         };
         machine_file::write(out, &identified.to_yaml(&head, comment))?;
     }
