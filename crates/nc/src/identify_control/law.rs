@@ -24,6 +24,8 @@ const INTERPOLATION: f64 = 3.0;
 const BETTER: f64 = 0.25;
 /// Relative difference of the squares of equal ramps.
 const SAME_RAMP: f64 = 0.01;
+/// How well a ramp with a jerk limit must show its acceleration.
+const LEAST_ROOT: f64 = 0.02;
 /// Part of the squares of a ramp that filters leave to its acceleration.
 const LEAST_SHARE: f64 = 0.1;
 /// Jerk limits from which a search starts, as multiples of the acceleration over the time of a filter.
@@ -108,16 +110,14 @@ fn jerk_squares(speed: f64, acceleration: f64, jerk: f64) -> f64 {
     }
 }
 
-/// Returns the acceleration of a ramp with a known jerk limit, at most `limit`; `None` if it does not reach its acceleration.
-fn jerk_limited_acceleration(ramp: &SpeedRamp, jerk: f64, limit: f64) -> Option<f64> {
-    if (ramp.squares / jerk_squares(ramp.speed, limit, jerk) - 1.0).abs() < SAME_RAMP {
-        return Some(limit);
-    }
+/// Returns the acceleration of a ramp with a known jerk limit, and how well the ramp shows it, 0 to 1; `None` if the ramp does
+/// not reach its acceleration.
+fn jerk_limited_acceleration(ramp: &SpeedRamp, jerk: f64) -> Option<[f64; 2]> {
     // (v/a)² + (a/j)² is smallest, 2 v/j, where the acceleration is just reached.
     let half = 0.5 * ramp.squares * jerk * jerk;
     let root = half * half - (ramp.speed * jerk).powi(2);
-    let square = if root > 1e-3 * half * half { half - root.sqrt() } else { return None };
-    Some(square.sqrt())
+    let share = root / (half * half);
+    (share > LEAST_ROOT).then(|| [(half - root.sqrt()).sqrt(), share])
 }
 
 /// Fits acceleration and jerk of one axis; the values are their logarithms.
@@ -262,21 +262,30 @@ impl RampLaw {
         Some(law)
     }
 
-    /// Returns the acceleration of a ramp of axes, at most the smallest of their limits; `None` if filters or jerk limit hide
-    /// it.
-    pub fn acceleration(&self, ramp: &SpeedRamp, axes: &[usize]) -> Option<f64> {
-        let least = |limits: &[Option<ControlEstimate>]| {
-            axes.iter().try_fold(f64::INFINITY, |least, &axis| Some(least.min(limits[axis]?.value)))
-        };
+    /// Returns the acceleration of a ramp of axes, and how well the ramp shows it, 0 to 1; `None` if filters or jerk limit
+    /// hide it.
+    pub fn acceleration(&self, ramp: &SpeedRamp, axes: &[usize]) -> Option<[f64; 2]> {
         match &self.smoothing {
             Smoothing::Jerk(jerks) => {
-                jerk_limited_acceleration(ramp, least(jerks)?, least(&self.accelerations)?)
+                let least = axes.iter().try_fold(f64::INFINITY, |j, &axis| Some(j.min(jerks[axis]?.value)));
+                jerk_limited_acceleration(ramp, least?)
             }
             _ => {
                 let square = ramp.squares - self.filter_squares();
-                (square > LEAST_SHARE * ramp.squares).then(|| ramp.speed / square.sqrt())
+                let share = square / ramp.squares;
+                (share > LEAST_SHARE).then(|| [ramp.speed / square.sqrt(), share])
             }
         }
+    }
+
+    /// Returns true if a ramp is that of the limits of an axis.
+    pub fn is_limit(&self, ramp: &SpeedRamp, axis: usize) -> bool {
+        let (Some(a), Smoothing::Jerk(jerks)) = (self.accelerations[axis], &self.smoothing) else {
+            return false;
+        };
+        jerks[axis].is_some_and(|j| {
+            (ramp.squares / jerk_squares(ramp.speed, a.value, j.value) - 1.0).abs() < SAME_RAMP
+        })
     }
 
     /// Returns the duration of a ramp of an axis before the filters, s.

@@ -98,6 +98,8 @@ pub fn identify_control<E: std::fmt::Display>(
 
 /// Relative difference up to which a part is a whole.
 const WHOLE: f64 = 0.015;
+/// Part of the best ramp from which on a ramp shows its acceleration.
+const SHOWN: f64 = 0.6;
 /// Relative difference of equal speeds.
 const SAME_SPEED: f64 = 5e-3;
 /// Part of the feed below which a corner is a stop, and above which it does not slow down.
@@ -232,7 +234,7 @@ fn identify_corners(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentif
 /// Identifies the parts of the acceleration on arcs.
 fn identify_circles(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentification) {
     let period = track.log.period;
-    let [mut normals, mut tangentials] = [Vec::new(), Vec::new()];
+    let (mut normals, mut tangentials) = (Vec::new(), Vec::new());
     for (index, motion) in track.motions.iter().enumerate() {
         let Some(arc) = motion.arc.filter(|_| motion.is_linear()) else { continue };
         let [Some(before), _] = track.rests(index) else { continue };
@@ -247,7 +249,7 @@ fn identify_circles(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentif
         }
         let Some(ramp) = ramp(&places, &constant, period) else { continue };
         let acceleration = law.acceleration(&ramp, &arc.plane);
-        tangentials.extend(acceleration.map(|a| a / limit));
+        tangentials.extend(acceleration.map(|[a, share]| [a / limit, share]));
     }
     found.values.retain(|value| value.key != "control.normal_fraction" || normals.is_empty());
     match ControlEstimate::of(normals, 2e-3) {
@@ -258,6 +260,10 @@ fn identify_circles(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentif
                 .to_owned(),
         ),
     }
+    // The circles that show it best.
+    let best = tangentials.iter().map(|[_, share]| *share).fold(0.0, f64::max);
+    tangentials.retain(|[_, share]| *share >= SHOWN * best);
+    let tangentials = tangentials.iter().map(|[part, _]| *part).collect();
     match ControlEstimate::of(tangentials, 2e-3) {
         Some(e) => found.push(
             "control.tangential_fraction",
@@ -319,7 +325,10 @@ fn identify_ends(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentifica
         let places: Vec<f64> = places.iter().map(|place| place * scale).collect();
         let Some(constant) = plateau(&places, track.log.resolution) else { continue };
         let Some(ramp) = ramp(&places, &constant, period) else { continue };
-        let acceleration = law.acceleration(&ramp, &[axis]);
+        let acceleration = match law.is_limit(&ramp, axis) {
+            true => Some(limit.value),
+            false => law.acceleration(&ramp, &[axis]).map(|[a, _]| a),
+        };
         let parts = if is_blended { &mut overlaps } else { &mut kinks };
         parts.extend(acceleration.map(|a| a / limit.value));
     }

@@ -1,7 +1,6 @@
 //! Part program that shows the profile of a control.
 
 use std::f64::consts::PI;
-use std::fmt::Write;
 
 use virtual_axes_core::config::{AxisKind, MachineConfig};
 
@@ -151,6 +150,6 @@ pub fn probe_program(machine: &MachineConfig, work_offsets: &[WorkOffset]) -> Re
         }
         line("G4 P0.2".to_owned());
     }
-    let _ = write!(text, "M2\n");
+    text.push_str("M2\n");
     Ok(text)
 }
