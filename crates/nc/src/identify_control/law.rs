@@ -24,7 +24,7 @@ const INTERPOLATION: f64 = 3.0;
 const BETTER: f64 = 0.25;
 /// Relative difference of the squares of equal ramps.
 const SAME_RAMP: f64 = 0.01;
-/// How well a ramp with a jerk limit must show its acceleration.
+/// Smallest share by which a ramp with a jerk limit shows its acceleration.
 const LEAST_ROOT: f64 = 0.02;
 /// Part of the squares of a ramp that filters leave to its acceleration.
 const LEAST_SHARE: f64 = 0.1;
