@@ -18,8 +18,8 @@ from generated_control import Control, motion_time, write
 CHECKOUT = Path(__file__).parents[1]
 COMMAND = Path(os.environ.get("CARGO_TARGET_DIR", CHECKOUT / "target")) / "release" / "virtual_axes"
 OFFSET = ["--work-offset", "G54=0,0,0"]
-SEEDS = range(1000, 1016)
-"""Seeds of the test; 100 of them with `python test_identify_control.py 1000 1100`."""
+SEEDS = range(2000, 2016)
+"""Seeds of the test; 100 of them with `python test_identify_control.py 2000 2100`."""
 PARAMETERS, TIME = 0.02, 0.01
 """Largest relative errors of parameters and of the time of unseen programs."""
 

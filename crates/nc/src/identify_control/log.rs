@@ -4,7 +4,7 @@ use virtual_axes_core::config::MachineConfig;
 
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates};
 
-/// Setpoints of a control, or recorded positions, at a constant sampling period.
+/// Setpoints of a control at a constant sampling period.
 #[derive(Debug, Clone)]
 pub struct ControlLog {
     /// Sampling period, s.
@@ -73,11 +73,5 @@ impl ControlLog {
             log.positions.push(position);
         }
         Ok(log)
-    }
-
-    /// Removes the first `delay` seconds: recorded positions follow their setpoints by it.
-    pub fn skip_delay(&mut self, delay: f64) {
-        let count = ((delay / self.period).round() as usize).min(self.positions.len());
-        self.positions.drain(..count);
     }
 }

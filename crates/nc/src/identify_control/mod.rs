@@ -98,6 +98,8 @@ pub fn identify_control<E: std::fmt::Display>(
 
 /// Relative difference up to which a part is a whole.
 const WHOLE: f64 = 0.015;
+/// A rule of arcs has more than one arc in this number of corners.
+const ARC_SHARE: usize = 4;
 /// Part of the best ramp from which on a ramp shows its acceleration.
 const SHOWN: f64 = 0.6;
 /// Relative difference of equal speeds.
@@ -132,7 +134,8 @@ fn identify_corners(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentif
     let slowed: Vec<&LineCorner> =
         blended.iter().filter(|corner| corner.speed < CORNER_SPEEDS[1] * corner.feed).collect();
     let steps: Vec<f64> = slowed.iter().map(|c| 2.0 * c.speed * (0.5 * c.turn).sin()).collect();
-    if 2 * arcs.len() > count {
+    // Filters hide the arcs of small P.
+    if arcs.len() > count / ARC_SHARE {
         let within: Vec<&&LineCorner> = arcs.iter().filter(|corner| corner.tolerance().is_some()).collect();
         let parts: Vec<f64> = within.iter().filter_map(|c| Some(c.distance() / c.tolerance()?)).collect();
         let distance = ControlEstimate::of(parts, 0.0);

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::NonEmptyStringValueParser;
 use virtual_axes_core::config::{ConfigError, DEFAULT_MACHINE, MachineConfig, Parameters, ValueSource};
 use virtual_axes_core::trial::{GridSource, SetpointSource};
-use virtual_axes_core::units::{MILLISECOND, seconds};
+use virtual_axes_core::units::seconds;
 use virtual_axes_nc::builtin::{open_program, program_folder};
 use virtual_axes_nc::identify_control::{ControlIdentification, ControlLog, identify_control};
 use virtual_axes_nc::interpret::{Interpreter, InterpreterOptions};
@@ -43,9 +43,6 @@ pub struct IdentifyControlArguments {
     /// Set a parameter, for example `control.wait_ms=0`; can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Delay of recorded positions behind their setpoints, ms, if the log has positions; the drives count as filters then.
-    #[arg(long, default_value_t = 0.0, value_name = "MS", value_parser = delay, allow_negative_numbers = true)]
-    delay_ms: f64,
     /// Write the machine with the identified profile to this file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -55,11 +52,6 @@ pub struct IdentifyControlArguments {
     part_program: PartProgramArguments,
     #[command(flatten)]
     output: OutputArguments,
-}
-
-fn delay(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|value| (0.0..=1000.0).contains(value));
-    value.ok_or_else(|| "must be in 0 … 1000".to_owned())
 }
 
 /// Runs the command and returns the profile.
@@ -81,8 +73,7 @@ pub fn run(arguments: &IdentifyControlArguments) -> Result<String, Box<dyn Error
     }
     // All errors of the program at once.
     program.survey(&config.without_trajectory_limits(), &mut |_| ())?;
-    let mut log = read_log(&input, &config)?;
-    log.skip_delay(arguments.delay_ms * MILLISECOND);
+    let log = read_log(&input, &config)?;
     let options = arguments.part_program.options()?;
     let name = &arguments.program;
     let steps = Interpreter::new(
