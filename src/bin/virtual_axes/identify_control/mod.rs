@@ -122,7 +122,8 @@ fn read_log(input: &CommandInput, machine: &MachineConfig) -> Result<ControlLog,
     let joints = source.joints().to_vec();
     let mut row = vec![0.0; joints.len()];
     let mut rows = Vec::new();
-    let mut resolution = 0.0_f64;
+    // Programs omit zeros at the end of numbers.
+    let mut resolution = f64::INFINITY;
     loop {
         let has_row = source.next(&mut row).map_err(|error| -> Box<dyn Error> { error })?;
         interrupt::check()?;
@@ -132,15 +133,15 @@ fn read_log(input: &CommandInput, machine: &MachineConfig) -> Result<ControlLog,
             );
         };
         for row in new {
-            let known = row.resolutions.iter().filter(|value| value.is_finite() && **value < 1e-4);
-            resolution = known.fold(resolution, |a, b| a.max(*b));
+            resolution = row.resolutions.iter().copied().fold(resolution, f64::min);
             rows.push((seconds(row.time), row.positions));
         }
         if !has_row {
             break;
         }
     }
-    let log = ControlLog::new(&machine, &joints, &rows, resolution.max(RESOLUTION));
+    let resolution = if resolution.is_finite() { resolution.max(RESOLUTION) } else { RESOLUTION };
+    let log = ControlLog::new(&machine, &joints, &rows, resolution);
     Ok(log.map_err(|error| format!("{}: {error}", input.name()))?)
 }
 
