@@ -341,3 +341,31 @@ def test_a_compiled_program_halves_the_error_of_deviating_axes(tmp_path: Path) -
     for deviation in PERTURBED:
         errors = [largest_error(simulated(session, "mikron", 1, deviation)) for session in sessions]
         assert errors[1] <= 0.5 * errors[0], (deviation, errors)
+
+
+def test_the_profile_of_linuxcnc_is_identified_from_its_setpoints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("VIRTUAL_AXES_PROGRAM_TIMEOUT_S", "170")
+    probe, log = tmp_path / "probe.nc", tmp_path / "log.csv"
+    options = ["--machine", "vmc", "--work-offset", "G54=0,0,0"]
+    subprocess.run([COMMAND, "psec", "--probe", *options, "--out", probe], check=True, timeout=60)
+    changes = {"FERROR": "9999", "MIN_FERROR": "9999"}
+    program = probe.read_text().replace("M2\n", "")
+    rows = completed(tmp_path, "mill", changes, [program], has_drives=False).rows()
+    lines = (f"{1e-3 * k}," + ",".join(repr(1e-3 * value) for value in row[::2]) for k, row in enumerate(rows))
+    log.write_text("time,x,y,z\n" + "\n".join(lines) + "\n")
+    command = [COMMAND, "identify-control", probe, log, *options, "--json"]
+    found = json.loads(subprocess.run(command, check=True, capture_output=True, text=True, timeout=60).stdout)
+    values = {value["parameter"]: value["value"] for value in found["values"]}
+    choices = {choice["parameter"]: choice["value"] for choice in found["choices"]}
+    assert choices["control.corners"] == "arc" and choices["control.jerk_limited"] == "false", found
+    # The limits of mill.ini, and what was read off the logs of other programs.
+    known = {f"{axis}.limits.acceleration_m_s2": 4.0 for axis in "xyz"}
+    known |= {"x.limits.velocity_m_min": 24.0, "y.limits.velocity_m_min": 24.0}
+    known |= {"control.normal_fraction": 0.866, "control.tangential_fraction": 0.5, "control.overlap_fraction": 0.5}
+    known["control.kink_fraction"] = 0.1
+    wrong = {key: values.get(key) for key, value in known.items() if not abs(values.get(key, 0) / value - 1) < 0.02}
+    assert not wrong, found
+    # The interpreter supplies short lines at a varying rate.
+    assert abs(found["profile_time_s"] / found["log_time_s"] - 1) < 0.05, found

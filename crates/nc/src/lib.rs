@@ -29,6 +29,7 @@
 
 pub mod builtin;
 pub mod compile;
+pub mod identify_control;
 pub mod interpret;
 pub mod motion;
 pub mod offline;

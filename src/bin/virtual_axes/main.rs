@@ -14,6 +14,7 @@ mod compile;
 mod design;
 mod export;
 mod identify;
+mod identify_control;
 mod input;
 mod learn;
 mod list;
@@ -80,6 +81,8 @@ enum Command {
     Robustness(Box<tune::robustness::RobustnessArguments>),
     /// Identify the parameters of an axis from recordings and write a machine file.
     Identify(Box<identify::IdentifyArguments>),
+    /// Identify the profile of a control from a part program and the setpoints that it made of it.
+    IdentifyControl(Box<identify_control::IdentifyControlArguments>),
     /// Validate a machine file, a scenario, setpoints, or a part program, and compare setpoints with the limits.
     Check(check::CheckArguments),
     /// Print the URDF of a machine, for robot_state_publisher and RViz.
@@ -230,6 +233,7 @@ fn run_command(command: &Command) -> Result<String, Box<dyn Error>> {
         Command::Compile(arguments) => compile::run(arguments),
         Command::Robustness(arguments) => tune::robustness::run(arguments),
         Command::Identify(arguments) => identify::run(arguments),
+        Command::IdentifyControl(arguments) => identify_control::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Urdf(arguments) => export::write_urdf(arguments),
         Command::Fmu(arguments) => export::write_fmu(arguments),

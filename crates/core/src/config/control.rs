@@ -1,8 +1,8 @@
 //! Trajectory planner of the control: how a part program becomes setpoints.
 
 use super::declaration::{choice_of, parameters};
-use super::definition::DefaultValue::{Integer, Number, Text};
-use super::definition::{ParameterDefinition, choice, integer, number};
+use super::definition::DefaultValue::{Flag, Integer, Number, Text};
+use super::definition::{ParameterDefinition, choice, flag, integer, number};
 use crate::units::{METER_PER_MINUTE, MILLIMETER, MILLISECOND};
 
 /// Key of the profile.
@@ -16,6 +16,25 @@ crate::named_values! {
         /// Trapezoidal, as LinuxCNC.
         LinuxCnc = "linuxcnc",
     }
+}
+
+crate::named_values! {
+    /// Name of a rule for corners in G64.
+    pub enum CornerRule {
+        /// Arc that touches both motions, within P.
+        Arc = "arc",
+        /// Stop.
+        Stop = "stop",
+        /// The change of the velocity has a limit.
+        VelocityStep = "velocity_step",
+        /// The speed is that of an arc within P, which is not moved along.
+        Deviation = "deviation",
+    }
+}
+
+/// Defines a time of a filter.
+const fn filter(key: &'static str) -> ParameterDefinition {
+    number(key, "ms", 0.0, 1000.0).zero().si(MILLISECOND)
 }
 
 /// Defines a fraction.
@@ -47,6 +66,22 @@ parameters! {
         /// control.profile linuxcnc; the rest limits the motion (ARC_BLEND_KINK_RATIO of the section TRAJ).
         pub kink_fraction: f64 =
             number("control.kink_fraction", "", 1e-3, 0.9).default(Number(0.1));
+        /// Rule for corners of lines and arcs in G64, with control.profile linuxcnc: arc, an arc that touches both motions
+        /// within P; stop; velocity_step, the exact path with at most the change of velocity control.corner_velocity_m_min;
+        /// deviation, the exact path at the speed of an arc within P. Motions of rotary axes overlap with arc, and stop
+        /// otherwise.
+        pub corners: CornerRule = choice("control.corners", CornerRule::NAMES).default(Text("arc")) => choice_of;
+        /// Largest change of the velocity in a corner, with control.corners velocity_step.
+        pub corner_velocity: f64 =
+            number("control.corner_velocity_m_min", "m/min", 1e-6, 1e4).default(Number(0.5)).si(METER_PER_MINUTE);
+        /// True if the jerk limits of the axes hold along the path, with control.profile linuxcnc: the acceleration is 0 where
+        /// two motions meet.
+        pub is_jerk_limited: bool = flag("control.jerk_limited").default(Flag(false));
+        /// Time of a moving average of the setpoints of each axis, with control.profile linuxcnc; 0 is no filter. The control
+        /// waits for the end of filtered motions at standstills and in G61.1.
+        pub filter_1: f64 = filter("control.filter_1_ms");
+        /// Time of a second moving average of the setpoints.
+        pub filter_2: f64 = filter("control.filter_2_ms");
         /// Deviation of G64 without P, with control.profile linuxcnc; 0 is no limit: as much as the feed needs.
         pub corner_tolerance: Option<f64> =
             number("control.corner_tolerance_mm", "mm", 0.0, 1e3).zero().si(MILLIMETER);
@@ -73,11 +108,23 @@ impl Default for ControlConfig {
             tangential_fraction: 0.5,
             overlap_fraction: 0.5,
             kink_fraction: 0.1,
+            corners: CornerRule::Arc,
+            corner_velocity: 0.5 * METER_PER_MINUTE,
+            is_jerk_limited: false,
+            filter_1: 0.0,
+            filter_2: 0.0,
             corner_tolerance: None,
             look_ahead: 50,
             block_cycle: MILLISECOND,
             gap_cycles: 4.0,
             wait: 25.0 * MILLISECOND,
         }
+    }
+}
+
+impl ControlConfig {
+    /// Returns the time by which the filters of the setpoints delay the end of a motion, s.
+    pub fn filter_time(&self) -> f64 {
+        self.filter_1 + self.filter_2
     }
 }

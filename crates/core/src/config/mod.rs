@@ -47,7 +47,7 @@ mod tests;
 pub use aliases::ParameterAlias;
 pub use axis::*;
 pub use axis_units::AxisUnits;
-pub use control::{ControlConfig, ControlProfile};
+pub use control::{ControlConfig, ControlProfile, CornerRule};
 pub use definition::{
     AxisKind, DefaultValue, MotorKind, ParameterDefinition, ParameterKind, Presence, Scope,
 };

@@ -99,8 +99,14 @@ impl PartProgramPlanner<'_> {
     /// `None` after the end of the program. Chunks and [`next_setpoint`](Self::next_setpoint) are not mixed.
     ///
     /// # Errors
-    /// Returns [`FeedPlanError`] with the source line.
+    /// Returns [`FeedPlanError`] with the source line, or for a control with filters of the setpoints.
     pub fn next_chunk(&mut self, cycles: u32) -> Result<Option<PlannedChunk>, FeedPlanError> {
+        if !self.filters.is_empty() {
+            self.is_finished = true;
+            let (name, allowed) =
+                ("control.filter_1_ms or control.filter_2_ms", "0 where the path is executed in chunks");
+            return Err(FeedPlanError::InvalidOption { name, value: 1e3 * self.filter_time, allowed });
+        }
         if self.is_finished {
             return Ok(None);
         }

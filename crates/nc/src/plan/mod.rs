@@ -10,7 +10,7 @@
 //! 3. Feed override: the planned time passes more slowly, within the limits of the axes and on the path.
 //!
 //! A machine whose control has another profile ([`ControlProfile`](virtual_axes_core::config::ControlProfile)) has a planner
-//! with trapezoidal speed in place of steps 1 and 2.
+//! with trapezoidal speed in place of steps 1 and 2, and filters of the setpoints.
 //!
 //! Limits of the profile `own` hold for the continuous motion, so that differences of setpoints at any position period keep them.
 
@@ -20,6 +20,7 @@ mod blended_path;
 mod chunk;
 mod corner;
 mod error;
+mod filter;
 mod interval_motion;
 mod look_ahead;
 mod machine_model;

@@ -10,6 +10,7 @@ use virtual_axes_core::units::seconds;
 
 use super::activity::{ProgramActivity, TimeKind};
 use super::error::{FeedPlanError, StepError};
+use super::filter::MovingAverage;
 use super::interval_motion::Law;
 use super::look_ahead::LookAhead;
 use super::machine_model::MachineModel;
@@ -112,6 +113,10 @@ pub struct PartProgramPlanner<'a> {
     pub(super) is_started: bool,
     pub(super) is_finished: bool,
     pub(super) last: PlannedSetpoint,
+    /// Filters of the setpoints, and the time and number of cycles by which they delay the end.
+    pub(super) filters: Vec<MovingAverage>,
+    pub(super) filter_time: f64,
+    settling_cycles: usize,
 }
 
 impl<'a> PartProgramPlanner<'a> {
@@ -153,6 +158,11 @@ impl<'a> PartProgramPlanner<'a> {
         parts.stops_at_auxiliaries = is_trapezoidal;
         let mut ahead = LookAhead::new(PieceSource::new(parts, options.knot_distance), Arc::new(model));
         ahead.trapezoid = is_trapezoidal.then(|| TrapezoidPlanner::new(control));
+        let times =
+            [control.filter_1, control.filter_2].into_iter().filter(|time| is_trapezoidal && *time > 0.0);
+        let filter_time = times.clone().sum();
+        let filters = times.clone().map(|time| MovingAverage::new(time, period)).collect();
+        let settling_cycles = times.map(|time| (time / period).ceil() as usize).sum();
         let place = PathPlace { programmed_feed: f64::INFINITY, ..PathPlace::default() };
         let last = PlannedSetpoint {
             psec: ORIGIN,
@@ -172,6 +182,9 @@ impl<'a> PartProgramPlanner<'a> {
             limits,
             is_finished: false,
             last,
+            filters,
+            filter_time,
+            settling_cycles,
         })
     }
 
@@ -202,12 +215,25 @@ impl<'a> PartProgramPlanner<'a> {
     /// Returns [`FeedPlanError`] with the source line.
     pub fn next_setpoint(&mut self, feed_override: f64) -> Result<Option<PlannedSetpoint>, FeedPlanError> {
         check_feed_override(feed_override)?;
-        if self.is_finished {
+        if self.is_finished && (!self.is_started || self.settling_cycles == 0) {
             return Ok(None);
         }
-        let result = self.cycle(feed_override);
-        self.is_finished |= result.is_err();
-        result
+        let result = if self.is_finished {
+            self.settling_cycles -= 1;
+            Ok(Some(self.last))
+        } else {
+            self.cycle(feed_override)
+        };
+        if result.is_err() {
+            (self.is_finished, self.settling_cycles) = (true, 0);
+        }
+        result.map(|setpoint| setpoint.map(|setpoint| self.filtered(setpoint)))
+    }
+
+    /// Returns a setpoint behind the filters.
+    fn filtered(&mut self, setpoint: PlannedSetpoint) -> PlannedSetpoint {
+        let psec = self.filters.iter_mut().fold(setpoint.psec, |psec, filter| filter.next(&psec));
+        PlannedSetpoint { psec, ..setpoint }
     }
 
     fn cycle(&mut self, feed_override: f64) -> Result<Option<PlannedSetpoint>, FeedPlanError> {

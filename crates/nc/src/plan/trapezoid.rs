@@ -13,9 +13,9 @@ use std::collections::VecDeque;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use virtual_axes_core::config::ControlConfig;
+use virtual_axes_core::config::{ControlConfig, CornerRule};
 
-use super::activity::ProgramStop;
+use super::activity::{ProgramActivity, ProgramStop, TimeKind};
 use super::corner::{CornerArc, cubic_corner};
 use super::error::FeedPlanError;
 use super::interval_motion::{IntervalMotion, Law, PathState};
@@ -44,6 +44,8 @@ struct Block {
     /// Limits of speed, m/s, and acceleration, m/s², along the path.
     speed: f64,
     acceleration: f64,
+    /// Jerk limit along the path, m/s³; infinite without one.
+    jerk: f64,
     /// Speed limit of its curvature, m/s.
     bend_speed: f64,
     /// True if the path has a corner at its start or end that G61 keeps.
@@ -75,6 +77,7 @@ struct Segment {
     length: f64,
     speed: f64,
     acceleration: f64,
+    jerk: f64,
     end: Junction,
 }
 
@@ -83,9 +86,11 @@ struct Segment {
 enum Element {
     Segment(Segment),
     Standstill(ProgramStop),
+    /// Wait for the end of the filtered motion.
+    Settling(ProgramActivity),
 }
 
-/// Phase of constant acceleration.
+/// Phase of constant jerk, which is 0 without a jerk limit.
 #[derive(Debug, Clone, Copy)]
 struct Phase {
     duration: f64,
@@ -93,6 +98,7 @@ struct Phase {
     at: f64,
     speed: f64,
     acceleration: f64,
+    jerk: f64,
 }
 
 /// Last part of a motion that overlaps with the next one.
@@ -143,12 +149,12 @@ impl TrapezoidPlanner {
         match self.elements.pop_front() {
             None => Ok(false),
             Some(Element::Standstill(stop)) => {
-                let motion = IntervalMotion::dwell(stop.time + self.control.wait);
-                entries.push_back(PlannedInterval::standstill(
-                    self.last_piece.clone(),
-                    motion,
-                    stop.activity,
-                ));
+                let time = stop.time + self.control.wait + self.control.filter_time();
+                self.stand_still(time, stop.activity, entries);
+                Ok(true)
+            }
+            Some(Element::Settling(activity)) => {
+                self.stand_still(self.control.filter_time(), activity, entries);
                 Ok(true)
             }
             Some(Element::Segment(segment)) => {
@@ -157,6 +163,12 @@ impl TrapezoidPlanner {
                 Ok(true)
             }
         }
+    }
+
+    /// Appends a standstill to the entries.
+    fn stand_still(&self, time: f64, activity: ProgramActivity, entries: &mut VecDeque<PlannedInterval>) {
+        let motion = IntervalMotion::dwell(time);
+        entries.push_back(PlannedInterval::standstill(self.last_piece.clone(), motion, activity));
     }
 
     /// Returns true if enough of the path is known to execute the first element.
@@ -195,8 +207,7 @@ impl TrapezoidPlanner {
                 speed = 0.0;
                 continue;
             };
-            let reachable = f64::sqrt(speed * speed + 2.0 * segment.acceleration * segment.length);
-            speed = reachable.min(segment.speed).min(before.speed).min(limit);
+            speed = segment.reachable(speed).min(segment.speed).min(before.speed).min(limit);
         }
         speed
     }
@@ -253,12 +264,14 @@ impl TrapezoidPlanner {
             speed = speed.min(limit / linear);
         }
         let mut acceleration = f64::INFINITY;
+        let mut jerk = f64::INFINITY;
         let mut bend_speed = f64::INFINITY;
         let is_simple = match &curve.shape {
             Shape::Line => {
                 for (bounds, &first) in model.joints.iter().zip(&first) {
                     speed = speed.min(bounds.velocity / first.abs());
                     acceleration = acceleration.min(bounds.acceleration / first.abs());
+                    jerk = jerk.min(bounds.jerk / first.abs());
                 }
                 (0..model.joints.len()).all(|joint| first[joint] == 0.0 || is_spatial(model, joint))
             }
@@ -273,6 +286,7 @@ impl TrapezoidPlanner {
                 for (joint, bounds) in model.joints.iter().enumerate() {
                     speed = speed.min(bounds.velocity / along(joint));
                     acceleration = acceleration.min(bounds.acceleration / along(joint));
+                    jerk = jerk.min(bounds.jerk / along(joint));
                 }
                 let bend = arc.plane.iter().map(|&i| second[i] * second[i]).sum::<f64>().sqrt();
                 let normal = self.control.normal_fraction
@@ -288,11 +302,13 @@ impl TrapezoidPlanner {
         speed *= scale;
         bend_speed *= scale;
         acceleration *= scale;
+        jerk = if self.control.is_jerk_limited { jerk * scale } else { f64::INFINITY };
         Ok(Block {
             scale,
             cut: 0.0,
             speed,
             acceleration,
+            jerk,
             bend_speed,
             has_kink: false,
             is_overlapping: false,
@@ -314,7 +330,17 @@ impl TrapezoidPlanner {
         let is_straight =
             angle < STRAIGHT || self.kink_speed(&before, &next, angle) > before.speed.max(next.speed);
         match first.at_end {
-            CurveEnd::Stop => self.push(&before, 0.0, Junction::Stop),
+            CurveEnd::Stop => {
+                self.push(&before, 0.0, Junction::Stop);
+                if self.control.filter_time() > 0.0 {
+                    let (line, tool) = (first.line, first.tool);
+                    self.elements.push_back(Element::Settling(ProgramActivity {
+                        kind: TimeKind::Feed,
+                        line,
+                        tool,
+                    }));
+                }
+            }
             CurveEnd::ExactPath => {
                 (before.has_kink, next.has_kink) = (before.has_kink || !is_straight, !is_straight);
                 let end = if is_straight { Junction::Through(f64::INFINITY) } else { Junction::Stop };
@@ -323,7 +349,9 @@ impl TrapezoidPlanner {
             CurveEnd::Blend(_) if is_rapid(first) != is_rapid(second) => {
                 self.push(&before, 0.0, Junction::Stop)
             }
-            CurveEnd::Blend([tolerance, rotary]) if !(before.is_simple && next.is_simple) => {
+            CurveEnd::Blend([tolerance, rotary])
+                if !(before.is_simple && next.is_simple) && self.control.corners == CornerRule::Arc =>
+            {
                 before.is_overlapping = true;
                 // Deviation along the path, whose speed and acceleration include those of the rotary axes.
                 let spatial = norm(&tangents[0], &model.kinds.linear);
@@ -333,13 +361,34 @@ impl TrapezoidPlanner {
                 let speed = 2.0 * (self.acceleration(&before) * deviation).sqrt();
                 self.push(&before, 0.0, Junction::Overlap(speed));
             }
-            CurveEnd::Blend(_) if angle > PI - REVERSAL => self.push(&before, 0.0, Junction::Stop),
-            CurveEnd::Blend(_) if is_straight => self.push(&before, 0.0, Junction::Through(f64::INFINITY)),
-            CurveEnd::Blend([tolerance, _]) => {
-                self.corner(&before, &mut next, &tangents, [angle, tolerance], model)
+            CurveEnd::Blend(_) if angle > PI - REVERSAL || !(before.is_simple && next.is_simple) => {
+                self.push(&before, 0.0, Junction::Stop)
             }
+            CurveEnd::Blend(_) if is_straight => self.push(&before, 0.0, Junction::Through(f64::INFINITY)),
+            CurveEnd::Blend([tolerance, _]) => match self.control.corners {
+                CornerRule::Arc => self.corner(&before, &mut next, &tangents, [angle, tolerance], model),
+                CornerRule::Stop => self.push(&before, 0.0, Junction::Stop),
+                CornerRule::VelocityStep => {
+                    let speed = self.control.corner_velocity / (2.0 * (0.5 * angle).sin());
+                    self.push(&before, 0.0, Junction::Through(speed));
+                }
+                CornerRule::Deviation => {
+                    let normal = self.corner_acceleration(&tangents, model)[0];
+                    let speed = (normal * corner_radius(angle, tolerance)).sqrt();
+                    self.push(&before, 0.0, Junction::Through(speed));
+                }
+            },
         }
         self.block = Some(next);
+    }
+
+    /// Returns the accelerations in a corner across and along the path, m/s².
+    fn corner_acceleration(&self, tangents: &[JointVector; 2], model: &MachineModel) -> [f64; 2] {
+        let moves = |joint: &usize| tangents.iter().any(|tangent| tangent[*joint] != 0.0);
+        let limits = (0..model.joints.len()).filter(moves).map(|joint| model.joints[joint].acceleration);
+        let acceleration = limits.fold(f64::INFINITY, f64::min);
+        let normal = (self.control.normal_fraction * acceleration).min(model.centripetal);
+        [normal, self.control.tangential_fraction * acceleration]
     }
 
     /// Returns the speed at which a change of direction in one block cycle uses its part of the acceleration.
@@ -358,18 +407,14 @@ impl TrapezoidPlanner {
         model: &MachineModel,
     ) {
         let [first, second] = [curve(&before.piece), curve(&next.piece)];
-        let moves = |joint: &usize| tangents.iter().any(|tangent| tangent[*joint] != 0.0);
-        let limits = (0..model.joints.len()).filter(moves).map(|joint| model.joints[joint].acceleration);
-        let acceleration = limits.fold(f64::INFINITY, f64::min);
-        let normal = (self.control.normal_fraction * acceleration).min(model.centripetal);
+        let [normal, tangential] = self.corner_acceleration(tangents, model);
         let (sine, cosine) = (0.5 * angle).sin_cos();
         let [before_length, next_length] = [before, &*next].map(|block| block.scale * block.piece.length);
         let most = 0.5 * before_length.min(next_length);
-        let tangential = self.control.tangential_fraction * acceleration;
         let [fastest, slowest] = [f64::max, f64::min]
             .map(|f| f(before.speed.min(before.bend_speed), next.speed.min(next.bend_speed)));
         // Neither an arc as long as a stop and a start nor one that allows the feed need be longer.
-        let radius = (tolerance * cosine / (1.0 - cosine))
+        let radius = corner_radius(angle, tolerance)
             .min(most * cosine / sine)
             .min((fastest * fastest / (tangential * angle)).max(fastest * fastest / normal));
         let cut = radius * sine / cosine;
@@ -406,6 +451,7 @@ impl TrapezoidPlanner {
             length: radius * angle,
             speed,
             acceleration: tangential,
+            jerk: before.jerk.min(next.jerk),
             end: Junction::Through(f64::INFINITY),
         });
         next.cut = cut;
@@ -445,6 +491,7 @@ impl TrapezoidPlanner {
             length: length.max(0.0),
             speed,
             acceleration,
+            jerk: block.jerk,
             end,
         });
     }
@@ -458,8 +505,7 @@ impl TrapezoidPlanner {
 
     /// Appends the motion along a segment to the entries.
     fn execute(&mut self, segment: &Segment, exit: f64, entries: &mut VecDeque<PlannedInterval>) {
-        let fastest = (self.speed * self.speed + 2.0 * segment.acceleration * segment.length).sqrt();
-        let exit = exit.min(fastest);
+        let exit = exit.min(segment.reachable(self.speed));
         let phases = phases(segment, [self.speed, exit]);
         let total: f64 = phases.iter().map(|phase| phase.duration).sum();
         let tail = self.tail_duration(segment, &phases);
@@ -481,7 +527,7 @@ impl TrapezoidPlanner {
                             let motion = TimedCurve { piece: Arc::clone(&segment.piece), state };
                             self.tail = Some(Tail { motion, duration: to - from });
                         }
-                        _ => entries.push_back(alone(segment, state, to - from)),
+                        _ => entries.push_back(alone(segment, state, phase.jerk / segment.scale, to - from)),
                     }
                 }
                 from = to;
@@ -498,7 +544,7 @@ impl TrapezoidPlanner {
         else {
             return 0.0;
         };
-        if last.acceleration >= 0.0 {
+        if last.acceleration >= 0.0 || segment.jerk.is_finite() {
             return 0.0;
         }
         let reached = next.speed.min((next.acceleration * next.length).sqrt());
@@ -515,12 +561,61 @@ impl Phase {
     /// Returns the state in the path parameter of the piece, `time` after the start of the phase.
     fn state(&self, time: f64, segment: &Segment) -> PathState {
         PathState {
-            u: segment.from
-                + (self.at + time * (self.speed + 0.5 * time * self.acceleration)) / segment.scale,
-            rate: (self.speed + time * self.acceleration).max(0.0) / segment.scale,
-            acceleration: self.acceleration / segment.scale,
+            u: segment.from + (self.at + self.distance(time)) / segment.scale,
+            rate: (self.speed + time * (self.acceleration + 0.5 * time * self.jerk)).max(0.0) / segment.scale,
+            acceleration: (self.acceleration + time * self.jerk) / segment.scale,
         }
     }
+
+    /// Returns the distance covered `time` after the start of the phase, m.
+    fn distance(&self, time: f64) -> f64 {
+        time * (self.speed + time * (0.5 * self.acceleration + time * self.jerk / 6.0))
+    }
+}
+
+impl Segment {
+    /// Returns the times of a change of speed: of each of the two parts of constant jerk, and of constant acceleration.
+    fn change(&self, speeds: [f64; 2]) -> [f64; 2] {
+        let change = (speeds[1] - speeds[0]).abs();
+        let jerk_time = (self.acceleration / self.jerk).min((change / self.jerk).sqrt());
+        [jerk_time, (change / self.acceleration - jerk_time).max(0.0)]
+    }
+
+    /// Returns the distance of a change of speed, m.
+    fn change_length(&self, speeds: [f64; 2]) -> f64 {
+        let [jerk_time, constant] = self.change(speeds);
+        0.5 * (speeds[0] + speeds[1]) * (2.0 * jerk_time + constant)
+    }
+
+    /// Returns the speed that is reached from another one along the segment, m/s.
+    fn reachable(&self, speed: f64) -> f64 {
+        let most = (speed * speed + 2.0 * self.acceleration * self.length).sqrt();
+        if self.jerk.is_infinite() {
+            return most;
+        }
+        largest([speed, most], |end| self.change_length([speed, end]) <= self.length)
+    }
+}
+
+/// Number of halvings that find a speed.
+const HALVINGS: usize = 60;
+
+/// Returns the largest number in a range that fits; the first one does.
+fn largest([mut fitting, mut most]: [f64; 2], fits: impl Fn(f64) -> bool) -> f64 {
+    if fits(most) {
+        return most;
+    }
+    for _ in 0..HALVINGS {
+        let middle = f64::midpoint(fitting, most);
+        if fits(middle) { fitting = middle } else { most = middle }
+    }
+    fitting
+}
+
+/// Returns the radius of the arc that passes a corner at a distance, m.
+fn corner_radius(angle: f64, distance: f64) -> f64 {
+    let cosine = (0.5 * angle).cos();
+    distance * cosine / (1.0 - cosine)
 }
 
 /// Returns the motion along a segment between two speeds.
@@ -529,13 +624,16 @@ fn phases(segment: &Segment, [start, end]: [f64; 2]) -> Vec<Phase> {
     if length < LEAST_LENGTH {
         return Vec::new();
     }
+    if segment.jerk.is_finite() {
+        return jerk_limited_phases(segment, [start, end]);
+    }
     let reachable = (0.5 * (start * start + end * end) + a * length).sqrt();
     let peak = speed.max(start).max(end).min(reachable);
     let mut phases = Vec::with_capacity(3);
     let mut at = 0.0;
     let mut push = |duration: f64, speed: f64, acceleration: f64| {
         if duration > 0.0 {
-            phases.push(Phase { duration, at, speed, acceleration });
+            phases.push(Phase { duration, at, speed, acceleration, jerk: 0.0 });
             at += duration * (speed + 0.5 * duration * acceleration);
         }
     };
@@ -547,6 +645,32 @@ fn phases(segment: &Segment, [start, end]: [f64; 2]) -> Vec<Phase> {
     push((peak - start) / a, start, a);
     push((length - ramps).max(0.0) / peak, peak, 0.0);
     push((peak - end) / a, peak, -a);
+    phases
+}
+
+/// Returns the motion along a segment between two speeds within its jerk limit.
+fn jerk_limited_phases(segment: &Segment, [start, end]: [f64; 2]) -> Vec<Phase> {
+    let ramps = |peak: f64| segment.change_length([start, peak]) + segment.change_length([peak, end]);
+    let least = start.max(end);
+    let peak = largest([least, segment.speed.max(least)], |peak| ramps(peak) <= segment.length);
+    let cruise = (segment.length - ramps(peak)).max(0.0) / peak;
+    let mut phases: Vec<Phase> = Vec::with_capacity(7);
+    let mut at = 0.0;
+    let mut push = |duration: f64, speed: f64, acceleration: f64, jerk: f64| {
+        if duration > 0.0 {
+            let phase = Phase { duration, at, speed, acceleration, jerk };
+            at += phase.distance(duration);
+            phases.push(phase);
+        }
+    };
+    for (speeds, sign, cruise) in [([start, peak], 1.0, cruise), ([peak, end], -1.0, 0.0)] {
+        let [jerk_time, constant] = segment.change(speeds);
+        let (jerk, acceleration) = (sign * segment.jerk, sign * segment.jerk * jerk_time);
+        push(jerk_time, speeds[0], 0.0, jerk);
+        push(constant, speeds[0] + 0.5 * acceleration * jerk_time, acceleration, 0.0);
+        push(jerk_time, speeds[1] - 0.5 * acceleration * jerk_time, acceleration, -jerk);
+        push(cruise, peak, 0.0, 0.0);
+    }
     phases
 }
 
@@ -589,9 +713,9 @@ fn angle_between(tangents: &[JointVector; 2], model: &MachineModel) -> f64 {
 }
 
 /// Returns the motion along a part of a segment.
-fn alone(segment: &Segment, state: PathState, duration: f64) -> PlannedInterval {
-    let length = duration * (state.rate + 0.5 * duration * state.acceleration);
-    let law = Law::Jerk { rate: state.rate, acceleration: state.acceleration, jerk: 0.0 };
+fn alone(segment: &Segment, state: PathState, jerk: f64, duration: f64) -> PlannedInterval {
+    let length = duration * (state.rate + duration * (0.5 * state.acceleration + duration * jerk / 6.0));
+    let law = Law::Jerk { rate: state.rate, acceleration: state.acceleration, jerk };
     let motion = IntervalMotion { law, length, duration };
     PlannedInterval::closed_form(Arc::clone(&segment.piece), state.u, motion)
 }

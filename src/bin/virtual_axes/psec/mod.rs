@@ -1,6 +1,7 @@
 //! `virtual_axes psec`: writes setpoints (PSEC) to a file.
 
 pub mod campaign;
+mod probe;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -38,6 +39,9 @@ pub struct PsecArguments {
 enum PsecKind {
     /// Write the setpoints of an identification campaign for one axis and print its timetable.
     Campaign(campaign::CampaignArguments),
+    /// Write a part program whose setpoints show the profile of a control, for identify-control.
+    #[command(long_flag = "probe")]
+    Probe(probe::ProbeArguments),
 }
 
 /// Arguments of `virtual_axes psec` for a scenario.
@@ -65,8 +69,11 @@ struct ScenarioPsecArguments {
 pub fn run(arguments: &PsecArguments) -> Result<String, Box<dyn Error>> {
     match (&arguments.kind, &arguments.scenario) {
         (Some(PsecKind::Campaign(arguments)), _) => campaign::run(arguments),
+        (Some(PsecKind::Probe(arguments)), _) => probe::run(arguments),
         (None, Some(scenario)) => write_scenario(scenario, &arguments.part_program, &arguments.log),
-        (None, None) => Err("psec requires a scenario or the subcommand `campaign`".into()),
+        (None, None) => {
+            Err("psec requires a scenario or one of the subcommands `campaign` and `probe`".into())
+        }
     }
 }
 

@@ -1,0 +1,185 @@
+"""Control profiles identified from setpoints of generated controls, whose parameters are known."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import random
+import statistics
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from generated_control import Control, motion_time, write
+
+CHECKOUT = Path(__file__).parents[1]
+COMMAND = Path(os.environ.get("CARGO_TARGET_DIR", CHECKOUT / "target")) / "release" / "virtual_axes"
+OFFSET = ["--work-offset", "G54=0,0,0"]
+SEEDS = range(2000, 2016)
+"""Seeds of the test; 100 of them with `python test_identify_control.py 2000 2100`."""
+PARAMETERS, TIME = 0.02, 0.01
+"""Largest relative errors of parameters and of the time of unseen programs."""
+
+
+def command(*words: object) -> str:
+    """Runs the command and returns its output."""
+    run = subprocess.run([COMMAND, *map(str, words)], capture_output=True, text=True, timeout=120, check=False)
+    assert run.returncode == 0, run.stderr
+    return run.stdout
+
+
+def unseen(seed: int) -> str:
+    """Returns a program with pockets, polylines, plunges and circles."""
+    draw = random.Random(seed)
+    text = ["G21 G90 G94 G17 G64 P0.05"]
+    for _ in range(4):
+        x, y = draw.uniform(-500, -250), draw.uniform(-300, -100)
+        tolerance = draw.choice([0.01, 0.02, 0.05, 0.1])
+        text += [
+            f"G64 P{tolerance}",
+            f"G0 X{x:.3f} Y{y:.3f}",
+            f"G1 Z-{draw.uniform(1, 5):.3f} F{draw.uniform(300, 2000):.0f}",
+        ]
+        heading, feed = draw.uniform(0, 360), draw.uniform(1500, 9000)
+        for index in range(draw.randint(8, 25)):
+            heading += draw.choice([-1, 1]) * draw.uniform(12, 130)
+            length = draw.choice([draw.uniform(2, 8), draw.uniform(8, 40)])
+            x, y = x + length * math.cos(math.radians(heading)), y + length * math.sin(math.radians(heading))
+            text.append(f"G1 X{x:.4f} Y{y:.4f}" + (f" F{feed:.0f}" if index == 0 else ""))
+        text += ["G4 P0.1", f"G3 I{draw.uniform(3, 20):.3f} J0 F{draw.uniform(2000, 12000):.0f}", "G4 P0.1", "G0 Z0"]
+    return "\n".join([*text, "M2\n"])
+
+
+def planned_time(folder: Path, machine: Path, program: Path) -> float:
+    """Returns the time from the first to the last motion in a profile, s."""
+    out = folder / "planned.csv"
+    settings = ["periods.position_ms=1"]
+    settings += [f"{axis}.limits.travel_{end}" for axis in "xyz" for end in ("min_mm=-9999", "max_mm=9999")]
+    options = [word for setting in settings for word in ("--set", setting)]
+    command("psec", program, "--machine", machine, "--out", out, *options, *OFFSET)
+    with out.open() as file:
+        rows = [[round(float(cell), 9) for cell in row[1:]] for row in list(csv.reader(file))[1:]]
+    moved = [index for index in range(1, len(rows)) if rows[index] != rows[index - 1]]
+    return 1e-3 * (moved[-1] - moved[0] + 1)
+
+
+def expected(control: Control) -> dict[str, float]:
+    """Returns the parameters that the setpoints of a probe program show."""
+    found = {
+        "control.wait_ms": 1e3 * control.wait,
+        "control.tangential_fraction": control.tangential_fraction,
+        "control.normal_fraction": control.normal_fraction,
+        "control.overlap_fraction": 1.0,
+        "control.block_cycle_ms": 1e3 * control.block_cycle,
+        "control.look_ahead": control.look_ahead,
+    }
+    for index, axis in enumerate("xyz"):
+        found[f"{axis}.limits.acceleration_m_s2"] = control.acceleration[index]
+        found[f"{axis}.limits.velocity_m_min"] = 60 * control.velocity[index]
+        if control.jerk is not None:
+            found[f"{axis}.limits.jerk_m_s3"] = control.jerk[index]
+            # An axis whose rapid traverse is slower than a²/j does not reach its acceleration.
+            if control.velocity[index] < control.acceleration[index] ** 2 / control.jerk[index]:
+                del found[f"{axis}.limits.acceleration_m_s2"]
+                if axis in "xy":
+                    found.pop("control.normal_fraction", None)
+                    found.pop("control.tangential_fraction", None)
+    for index, time in enumerate(control.filters):
+        found[f"control.filter_{index + 1}_ms"] = 1e3 * time
+    if control.corners == "velocity_step":
+        found["control.corner_velocity_m_min"] = 60 * control.corner_velocity
+    if control.corners in ("arc", "deviation"):
+        found["control.corner_tolerance_mm"] = 1e3 * control.corner_tolerance
+    return found
+
+
+def difference(key: str, value: float, truth: float, control: Control) -> float:
+    """Returns a relative error; that of a wait and of a number of blocks is at least their resolution."""
+    resolution = {"control.wait_ms": 1.5e3 * control.period, "control.look_ahead": 1.0}.get(key, 0.0)
+    return max(abs(value - truth) - resolution, 0.0) / truth
+
+
+def judged(folder: Path, seed: int, probe: Path) -> tuple[dict[str, float], list[float], list[str], Control]:
+    """Returns errors of parameters, of the times of unseen programs, and what is wrong otherwise."""
+    control = Control.drawn(seed)
+    log, machine = folder / "log.csv", folder / "identified.yaml"
+    write(log, control, probe.read_text())
+    options = ["--machine", "vmc", *OFFSET, "--out", machine, "--json"]
+    found = json.loads(command("identify-control", probe, log, *options))
+    values = {value["parameter"]: value["value"] for value in found["values"]}
+    choices = {choice["parameter"]: choice["value"] for choice in found["choices"]}
+    truth = expected(control)
+    wrong = [] if choices.get("control.corners") == control.corners else [f"corners {choices.get('control.corners')}"]
+    smoothings = {key for key in values if "filter" in key or "jerk" in key}
+    wrong += sorted(smoothings ^ {key for key in truth if "filter" in key or "jerk" in key})
+    # The limit may not slow down rows of short lines and corners without P; a jerk limit may hide the ramps of circles.
+    optional = {"control.block_cycle_ms", "control.look_ahead", "control.corner_tolerance_mm"}
+    optional |= {"control.tangential_fraction"} if control.jerk is not None else set()
+    wrong += sorted(set(truth) - set(values) - optional)
+    errors = {key: difference(key, values[key], truth[key], control) for key in truth if key in values}
+    times = [found["profile_time_s"] / found["log_time_s"] - 1]
+    for index in range(2):
+        program = folder / "unseen.nc"
+        program.write_text(unseen(10 * seed + index))
+        times.append(planned_time(folder, machine, program) / motion_time(control, program.read_text()) - 1)
+    return errors, times, wrong, control
+
+
+@pytest.fixture(scope="module")
+def probe(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Returns the program that shows the profile."""
+    return written_probe(tmp_path_factory.mktemp("probe"))
+
+
+def written_probe(folder: Path) -> Path:
+    """Writes the program that shows the profile."""
+    path = folder / "probe.nc"
+    command("psec", "--probe", "--machine", "vmc", *OFFSET, "--out", path)
+    return path
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_parameters_and_times_are_those_of_the_control(tmp_path: Path, probe: Path, seed: int) -> None:
+    errors, times, wrong, control = judged(tmp_path, seed, probe)
+    text = f"{control}\n{errors}\n{times}\n{wrong}"
+    assert not wrong, text
+    assert max(errors.values()) < PARAMETERS, text
+    assert max(map(abs, times)) < TIME, text
+
+
+def main(first: int, end: int) -> None:
+    """Prints the distribution of the errors over seeds."""
+    import tempfile
+
+    of_key: dict[str, list[float]] = {}
+    all_times: list[float] = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        program = written_probe(folder)
+        for seed in range(first, end):
+            try:
+                errors, times, wrong, control = judged(folder, seed, program)
+            except AssertionError as error:
+                print(seed, error)
+                continue
+            bad = {key: round(error, 4) for key, error in errors.items() if error >= PARAMETERS}
+            late = [round(time, 4) for time in times if abs(time) >= TIME]
+            if bad or late or wrong:
+                smoothing = "jerk" if control.jerk is not None else f"{len(control.filters)} filters"
+                print(seed, smoothing, control.corners, bad, late, wrong)
+            for key, error in errors.items():
+                of_key.setdefault(key.split(".", 1)[1] if key[1] == "." else key, []).append(error)
+            all_times += times[1:]
+    for key, values in [*of_key.items(), ("time", [abs(time) for time in all_times])]:
+        within = sum(value < (TIME if key == "time" else PARAMETERS) for value in values)
+        middle, most = 100 * statistics.median(values), 100 * max(values)
+        print(f"{key}: median {middle:.3f} %, largest {most:.2f} %, {within} of {len(values)} within")
+
+
+if __name__ == "__main__":
+    import sys
+
+    main(int(sys.argv[1]), int(sys.argv[2]))
