@@ -122,7 +122,7 @@ impl IdentifyArguments {
 struct Start {
     parameters: Parameters,
     axes: Vec<SelectedAxis>,
-    /// What is said of the other axes of the recordings.
+    /// Findings about the other axes of the recordings.
     others: Vec<Finding>,
 }
 
