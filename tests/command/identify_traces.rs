@@ -54,9 +54,9 @@ fn without_axis_the_columns_and_the_next_command_are_listed() {
     };
     for (axis, name) in [("X", "x"), ("Z", "z")] {
         for (signal, channel) in [
-            ("commanded position [mm]", "psec"),
-            ("actual position [mm]", "position"),
-            ("actual velocity [mm/s]", "velocity"),
+            ("commanded position", "psec"),
+            ("actual position", "position"),
+            ("actual velocity", "velocity"),
             ("current [A]", "current"),
         ] {
             let cells = row(&format!("{axis} {signal}"));

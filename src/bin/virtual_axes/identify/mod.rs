@@ -171,6 +171,10 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     }
     let summaries: Vec<IdentificationSummary> = found.into_iter().map(|found| found.summary).collect();
     let mut texts: Vec<String> = summaries.iter().map(|summary| output(arguments, summary)).collect();
+    if matches!(arguments.output.format(), OutputFormat::Text | OutputFormat::Quiet) {
+        let others = others.iter().map(|finding| &finding.what);
+        texts.extend(excluded.iter().chain(others).map(|line| text_table::wrapped_line(line)));
+    }
     if let Some(reason) = invalid {
         drop(spinner);
         return Err(Box::new(InvalidResult { text: joined(arguments, &summaries, &texts)?, reason }));
@@ -180,10 +184,6 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
         machine_file::write(out, &machine_text(machine, &summaries, &identified))?;
     }
     drop(spinner);
-    if matches!(arguments.output.format(), OutputFormat::Text | OutputFormat::Quiet) {
-        let others = others.iter().map(|finding| &finding.what);
-        texts.extend(excluded.iter().chain(others).map(|line| text_table::wrapped_line(line)));
-    }
     joined(arguments, &summaries, &texts)
 }
 
