@@ -28,9 +28,10 @@ pub(super) struct FileFilter<'a> {
 impl FileFilter<'_> {
     /// Removes the ignored parameters from `assignments` and returns the reasons, one for each parameter or group of them.
     ///
-    /// A file with a parameter that only controllers have, or for a controller manager, is the file of a controller. Its unknown parameters are ignored in
-    /// every section, since controllers ignore them, and so are its joints if this machine does not have all of them. In a
-    /// section for several nodes, `joints` without one of this machine and a single `machine` are those of another node.
+    /// A file with a parameter that only controllers have, or for a controller manager, is the file of a controller. Its
+    /// unknown parameters are ignored in every section, since controllers ignore them, and so are its joints if this machine
+    /// does not have all of them. In a section for several nodes, `joints` without one of this machine, and `machine` without
+    /// parameters of a machine, are those of another node.
     ///
     /// # Errors
     /// That about the first key of `unusable` that is not ignored.

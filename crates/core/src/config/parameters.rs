@@ -152,10 +152,10 @@ impl Parameters {
         let mut assignments = file.assignments;
         let has = |wanted: &dyn Fn(&str) -> bool| assignments.iter().any(|one| wanted(&one.key));
         let has_joints = has(&|key| key == "joints");
-        // A section for several nodes may have a parameter `machine` of another node.
+        // A section for several nodes may have parameters `machine` and `joints` of another node.
         let has_machine = has(&|key| key == "machine")
             && (!file.shared.contains("machine")
-                || has(&|key| key != "machine" && self.layout.is_of_machine(key)));
+                || has(&|key| !["machine", "joints"].contains(&key) && self.layout.is_of_machine(key)));
         let is_machine_replaced = has_machine || has_joints && has(&|key| key.ends_with(".type"));
         // The node reads its own dump, in which a parameter without value is null.
         file.unset.filter(|_| is_machine_replaced && node.is_none()).map_or(Ok(()), Err)?;

@@ -365,6 +365,8 @@ fn files_of_other_nodes_that_ros_reads_are_accepted() {
     ] {
         assert_eq!(shared(line), Ok((mikron(), vec![format!("site.yaml:3: {reason}")])), "{line}");
     }
+    let both = shared("machine: ur5e\n    joints: [shoulder, elbow]").expect("a file of another node");
+    assert_eq!((both.0, both.1.len()), (mikron(), 2));
     for (line, reason) in [
         ("x.velocity_loop.gain: [1, two]", "x.velocity_loop.gain: found a list with mixed types"),
         ("joints: [x, elbow]", "elbow.type is missing"),
