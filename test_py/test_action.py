@@ -178,11 +178,11 @@ REJECTED_GOALS = {
         "MULTI_DOF",
         "component_goal_tolerance",
     ),
-    "tolerance of another joint": (
-        lambda g: setattr(g, "path_tolerance", tolerance("z", position=0.1)),
+    "tolerance of an unknown joint": (
+        lambda g: setattr(g, "path_tolerance", tolerance("q", position=0.1)),
         Result.INVALID_GOAL,
         "INVALID_TOLERANCE",
-        "joint z",
+        "joint q",
     ),
     "tolerance twice": (
         lambda g: setattr(g, "goal_tolerance", 2 * tolerance("x", position=0.1)),
