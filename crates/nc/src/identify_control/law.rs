@@ -60,7 +60,7 @@ pub(super) enum Smoothing {
     Jerk(Vec<Option<ControlEstimate>>),
 }
 
-/// RampLaw of the ramps of all axes.
+/// Law of the ramps of all axes.
 #[derive(Debug, Clone)]
 pub(super) struct RampLaw {
     /// Acceleration of each axis; `None` without a ramp.

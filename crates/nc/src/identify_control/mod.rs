@@ -16,6 +16,7 @@ mod ramp;
 mod track;
 
 use virtual_axes_core::config::{AxisKind, MachineConfig};
+use virtual_axes_core::statistics::{mean, rms};
 use virtual_axes_core::units::{METER_PER_MINUTE, MILLISECOND, REVOLUTION, RPM};
 
 pub use self::log::ControlLog;
@@ -107,10 +108,9 @@ const SAME_SPEED: f64 = 5e-3;
 /// Part of the feed below which a corner is a stop, and above which it does not slow down.
 const CORNER_SPEEDS: [f64; 2] = [0.02, 0.97];
 
-/// Returns the relative deviation of values from their mean.
+/// Returns the relative deviation of values from their mean, NaN without values.
 fn spread(values: &[f64]) -> f64 {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    (values.iter().map(|value| (value / mean - 1.0).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
+    mean(values).and_then(|mean| rms(values.iter().map(|value| value / mean - 1.0))).unwrap_or(f64::NAN)
 }
 
 /// Identifies the rule for corners in G64.
