@@ -179,6 +179,18 @@ fn a_frame_is_not_changed_while_it_is_referenced() {
 }
 
 #[test]
+fn an_inactive_node_publishes_no_frame() {
+    let mut thread = TestThread::new();
+    // As at the start of a managed node: the grid is moved to the wall clock, then the node is deactivated.
+    thread.axes.jump_to(1_000_000_000);
+    thread.command(Command::Deactivate { id: MotionId(1), stop: None, done: oneshot::channel().0 });
+    for _ in 0..3 {
+        thread.run_cycle();
+        assert!(!thread.frames.1.try_recv().expect("a frame").is_published);
+    }
+}
+
+#[test]
 fn unread_frames_are_dropped_and_counted() {
     let mut thread = TestThread::new();
     for _ in 0..70 {

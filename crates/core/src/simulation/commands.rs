@@ -98,7 +98,10 @@ impl Simulation {
     pub fn jump_to(&mut self, time: Nanoseconds) {
         let from = self.time_of(self.next - 1);
         self.motions.abort_all(AbortReason::ClockJump { from, to: time }, from, &mut self.finished);
-        self.timeline.halt();
+        // Before the first cycle the axes are at rest: a stop would make them busy for a cycle.
+        if self.next > 0 || self.has_active_commands() {
+            self.timeline.halt();
+        }
         self.loads.clear();
         self.grid.origin = time.saturating_sub(self.next.saturating_mul(self.grid.period));
     }
