@@ -39,13 +39,13 @@ def number(value: int) -> bytes:
     return struct.pack("<iI", value >> 32, value & 0xFFFFFFFF)
 
 
-def announcement(port: int, host: str = "127.0.0.1") -> bytes:
+def announcement(port: int, host: str = "127.0.0.1", prefix: bytes = PREFIX) -> bytes:
     """Returns the announcement of a participant with all built-in endpoints at an address."""
     locator = struct.pack("<II", 1, port) + bytes(12) + socket.inet_aton(host)
     parameters = [
         (0x15, b"\x02\x03\0\0"),
         (0x16, b"\x01\x0f\0\0"),
-        (0x50, PREFIX + bytes.fromhex("000001c1")),
+        (0x50, prefix + bytes.fromhex("000001c1")),
         (0x32, locator),
         (0x31, locator),
         (0x02, struct.pack("<iI", 100, 0)),
@@ -54,7 +54,7 @@ def announcement(port: int, host: str = "127.0.0.1") -> bytes:
     ]
     payload = b"\0\3\0\0" + b"".join(struct.pack("<HH", pid, len(value)) + value for pid, value in parameters)
     head = struct.pack("<HH", 0, 16) + bytes(4) + bytes.fromhex("000100c2") + number(1)
-    return message(submessage(0x15, 0x05, head + payload))
+    return message(submessage(0x15, 0x05, head + payload), prefix=prefix)
 
 
 def heartbeat(first: int, last: int, count: int) -> bytes:
@@ -145,6 +145,37 @@ def test_two_datagrams_take_no_memory(hostile: list[bytes]) -> None:
         drive.accept(joint_trajectory(["x"], [0.0, 1.0], [[0.0], [0.01]]), 10)
         print(f"\n{before:.0f} MB before, at most {peak_mb(node.pid):.0f} MB")
         assert peak_mb(node.pid) < MAX_MB
+
+
+PARTICIPANTS = 20_000
+"""Number of forged participants."""
+SENDING_S = 10.0
+
+
+@pytest.mark.extended
+def test_forged_participants_do_not_stop_the_axes() -> None:
+    """No position cycle is lost, though samples come late; then services respond again."""
+    with first_participant() as node, AxesClient(process=node) as drive:
+        drive.accept(joint_trajectory(["x"], [0.0, 60.0], [[0.0], [0.05]]), 10)
+        before, began, begin = resident_mb(node.pid), drive.now(), time.monotonic()
+        with sender(node.domain_id, DISCOVERY_PORT) as send, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sink:
+            sink.bind(("127.0.0.1", 0))
+            port = sink.getsockname()[1]
+            for index in range(PARTICIPANTS):
+                send(announcement(port, prefix=b"\x01\x0f" + struct.pack(">HQ", 0, index)))
+                time.sleep(max(0.0, begin + SENDING_S * (index + 1) / PARTICIPANTS - time.monotonic()))
+        sent = time.monotonic()
+        end = began + round((sent - begin) * NANOSECONDS)
+        drive.wait_until(end, 120)
+        late = time.monotonic() - sent
+        stamps = drive.record(began, end).joints.stamp
+        drive.get_parameters(["x.position_loop.gain"])
+        responds = time.monotonic() - sent
+        print(f"\nsamples {late:.1f} s late, services {responds:.1f} s; {before:.0f} MB, at most {peak_mb(node.pid):.0f} MB")
+        assert len(stamps) == round((stamps[-1] - stamps[0]) / TSP_NS) + 1
+        assert stamps[0] == began and stamps[-1] > end - TSP_NS
+        assert peak_mb(node.pid) < MAX_MB
+        drive.stop(30.0)
 
 
 def mutated(datagram: bytes, choice: random.Random) -> bytes:

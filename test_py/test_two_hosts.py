@@ -99,8 +99,9 @@ def test_samples_arrive_again_after_the_link_was_down():
         assert after["missing"] == 0 and after["received"] > 100
 
 
+LOOPBACK = "127.0.0.1"
 PORT, COUNT_S = 9999, 20.0
-"""Port of the second host that an announcement names; time for which the datagrams to it are counted, s."""
+"""Port that an announcement names; time for which the datagrams to it are counted, s."""
 COUNT = """
 import socket, sys, time
 receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -122,11 +123,16 @@ sender.sendto(bytes.fromhex(sys.argv[3]), (sys.argv[1], int(sys.argv[2])))
 """
 
 
-def datagrams_to_announced_host(link: Link, node: Node, from_host: int, to_address: str) -> int:
-    """Sends an announcement with an address of the second host to the node; returns the number of datagrams there."""
+def datagrams_to_announced_host(
+    link: Link, node: Node, from_host: int, to_address: str, announced_address: str = CLIENT_ADDRESS
+) -> int:
+    """Sends an announcement to the node; returns the number of datagrams at the announced address of the second host, or of
+    the node's own if it is a loopback address.
+    """
     prefixes = [["ip", "netns", "exec", name, sys.executable, "-c"] for name in link.names]
-    announced = announcement(PORT, CLIENT_ADDRESS).hex()
-    counting = [*prefixes[1], COUNT, CLIENT_ADDRESS, str(PORT), str(COUNT_S)]
+    announced = announcement(PORT, announced_address).hex()
+    counting_host = 0 if announced_address == LOOPBACK else 1
+    counting = [*prefixes[counting_host], COUNT, announced_address, str(PORT), str(COUNT_S)]
     with subprocess.Popen(counting, stdout=subprocess.PIPE, text=True) as counter:
         assert counter.stdout.readline() == "ready\n"
         while START_SCREEN_END not in node.output():
@@ -142,10 +148,17 @@ def test_a_node_of_this_host_only_discards_datagrams_of_others_and_sends_them_no
     """With LOCALHOST, neither an announcement of the other host nor one with its address is answered there."""
     with Link() as link, node_behind(link, ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST") as node:
         assert datagrams_to_announced_host(link, node, 1, NODE_ADDRESS) == 0
-        assert datagrams_to_announced_host(link, node, 0, "127.0.0.1") == 0
+        assert datagrams_to_announced_host(link, node, 0, LOOPBACK) == 0
+
+
+def test_a_node_of_this_host_only_does_not_receive_from_others():
+    """An announcement that names the node's own loopback address is answered, unless it comes from the other host."""
+    with Link() as link, node_behind(link, ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST") as node:
+        assert datagrams_to_announced_host(link, node, 1, NODE_ADDRESS, LOOPBACK) == 0
+        assert datagrams_to_announced_host(link, node, 0, LOOPBACK, LOOPBACK) > 0
 
 
 def test_an_announced_address_that_sends_nothing_gets_few_datagrams():
     """Any host can announce the address of a third host: the node sends it 100 datagrams and one per second."""
     with Link() as link, node_behind(link) as node:
-        assert 0 < datagrams_to_announced_host(link, node, 0, "127.0.0.1") <= 100 + COUNT_S
+        assert 0 < datagrams_to_announced_host(link, node, 0, LOOPBACK) <= 100 + COUNT_S
