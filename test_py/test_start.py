@@ -68,6 +68,7 @@ def test_parameters_of_other_nodes_are_ignored(start: Callable[..., AxesClient],
     ("text", "gain", "warnings"),
     [
         ("", 3.0, ["contains no parameters"]),
+        ("{}\n", 3.0, ["contains no parameters"]),
         (
             "/**: {ros__parameters: {cell: 1}}\n/**: {ros__parameters: {x.velocity_loop.gain: 4.0}}\n",
             4.0,

@@ -53,7 +53,12 @@ pub(super) fn read(
 ) -> Result<ParameterFile, ConfigError> {
     let root = parse(text, source)?;
     // All sections are commented out.
-    if node.is_some() && matches!(root.value, YamlNode::Null) {
+    let is_empty = match &root.value {
+        YamlNode::Null => true,
+        YamlNode::Map(entries) => entries.is_empty(),
+        _ => false,
+    };
+    if node.is_some() && is_empty {
         return Ok(ParameterFile::default());
     }
     let YamlNode::Map(entries) = root.value else {
