@@ -171,7 +171,7 @@ def test_forged_participants_do_not_stop_the_axes() -> None:
         stamps = drive.record(began, end).joints.stamp
         drive.get_parameters(["x.position_loop.gain"])
         responds = time.monotonic() - sent
-        print(f"\nsamples {late:.1f} s late, services {responds:.1f} s; {before:.0f} MB, at most {peak_mb(node.pid):.0f} MB")
+        print(f"\nlate: samples {late:.1f} s, services {responds:.1f} s; {before:.0f} to {peak_mb(node.pid):.0f} MB")
         assert len(stamps) == round((stamps[-1] - stamps[0]) / TSP_NS) + 1
         assert stamps[0] == began and stamps[-1] > end - TSP_NS
         assert peak_mb(node.pid) < MAX_MB

@@ -126,8 +126,9 @@ sender.sendto(bytes.fromhex(sys.argv[3]), (sys.argv[1], int(sys.argv[2])))
 def datagrams_to_announced_host(
     link: Link, node: Node, from_host: int, to_address: str, announced_address: str = CLIENT_ADDRESS
 ) -> int:
-    """Sends an announcement to the node; returns the number of datagrams at the announced address of the second host, or of
-    the node's own if it is a loopback address.
+    """Sends an announcement to the node; returns the number of datagrams at the announced address.
+
+    It is one of the second host, or the node's own loopback address.
     """
     prefixes = [["ip", "netns", "exec", name, sys.executable, "-c"] for name in link.names]
     announced = announcement(PORT, announced_address).hex()
