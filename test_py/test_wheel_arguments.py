@@ -14,6 +14,7 @@ import warnings
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
+import control
 import numpy as np
 import pytest
 
@@ -41,6 +42,22 @@ def machine() -> va.Machine:
         (lambda m: m.simulate({"x": ["a", "b"]}), TypeError, "psec of x"),
         (lambda m: m.simulate(STILL, signals="position"), TypeError, "signals is 'position'"),
         (lambda m: m.simulate(STILL, signals=["psec"]).following_error, ValueError, "'position' is not recorded"),
+        (lambda m: m.simulate(STILL, signals=5), TypeError, "signals is 5; it must be a list"),
+        (lambda m: m.simulate(STILL, loads=np.zeros((0, 5))), ValueError, "loads has no rows"),
+        (lambda m: m.simulate(STILL, loads={"time": [0.0], "x": [1.0]}), ValueError, "loads has a column time"),
+        (lambda m: m.simulate({"x": (value for value in [0.0])}), TypeError, "psec of x is of type generator"),
+        (lambda m: m.simulate(STILL).plot([]), ValueError, "axes is empty; it needs one or more of x, y"),
+        (lambda m: va.Machine.from_yaml(b""), TypeError, "text is b''; it must be a text"),
+        (lambda m: va.tune(m, STILL, controller="gpc", also=None), TypeError, "also is of type NoneType"),
+        (lambda m: va.robustness(m, STILL, cost=5), TypeError, "cost is 5; it must be a text"),
+        (lambda m: va.identify({b"time": [0.0]}, "x", m), TypeError, "channel is b'time'; it must be a text"),
+        (lambda m: va.identify({"time": [0.0]}, "x", m, rate_hz=0), ValueError, "rate_hz 0.0: must be above 0 Hz"),
+        (lambda m: va.design.model(m, None), TypeError, "axis is None; it must be a text"),
+        (lambda m: va.design.place_poles(va.design.model(m, "x"), [0.5, None]), TypeError, "poles is .*None"),
+        (lambda m: va.design.plot_bode(m, []), ValueError, "axes is empty"),
+        (lambda m: va.Stepper(m, 2).reset(only=[True]), TypeError, "machine True: must be an integer"),
+        (lambda m: va.design.from_control(control.tf([1], [1, 0], True), period=True), TypeError, "period is True"),
+        (lambda m: va.design.from_control(control.tf([1, 0], [1, 0.5], 0.006)), ValueError, "multiply by 1/z"),
         (lambda m: va.Stepper("axes"), TypeError, "machine is of type str"),
         (lambda m: va.Stepper(m, -1), ValueError, "machines -1: must be from 1 to 100000"),
         (lambda m: va.Stepper(m, 10**20), ValueError, "machines 1000"),
@@ -104,7 +121,7 @@ def machine() -> va.Machine:
         (lambda m: va.learn(m, STILL, gain="a"), TypeError, "gain is 'a'; it must be a real number"),
         (lambda m: va.learn(m, STILL, bandwidth_hz="a"), TypeError, "bandwidth_hz is 'a': must be real number"),
         (lambda m: va.tune("vmc", STILL), TypeError, "machine is of type str; it must be a Machine"),
-        (lambda m: va.tune(m, STILL, cost=3), TypeError, "cost is 3: 'int' object"),
+        (lambda m: va.tune(m, STILL, cost=3), TypeError, "cost is 3; it must be a text"),
         (lambda m: va.tune(m, STILL, modulus_margin="a"), TypeError, "modulus_margin is 'a': must be real number"),
         (lambda m: va.tune(m, STILL, controller="gpc", designs=1.5), TypeError, "designs 1.5: must be an integer"),
         (lambda m: va.tune(m, STILL, controller="cascade", seed=-1), ValueError, "seed -1: must be from 0 to"),

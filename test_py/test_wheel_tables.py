@@ -8,6 +8,7 @@ import json
 import pickle
 import subprocess
 import sys
+import types
 from datetime import timedelta
 from decimal import Decimal
 from pathlib import Path
@@ -126,7 +127,10 @@ def test_a_table_with_times_is_interpolated_as_by_the_command(machine: va.Machin
             pd.DataFrame({"x": X}, index=pd.MultiIndex.from_arrays([TIMES, Y])),
             "psec has an index of type object without a name",
         ),
-        (pd.DataFrame({("x", "psec"): X, ("x", "position"): X}), r"axis \"\('x', 'psec'\)\" is unknown"),
+        (
+            pd.DataFrame({("x", "psec"): X, ("x", "position"): X}),
+            r"columns of 2 levels, as \('x', 'psec'\); it needs one",
+        ),
         (np.ma.masked_greater(np.column_stack([X] + 4 * [0 * X]), 0.005), "at 0.3 s: x: position is NaN"),
         ({"time": TIMES, "x": np.where(X > 0.005, np.nan, X)}, "psec: row 50 of x is NaN, not a finite number"),
         ({"time": np.where(X > 0, np.nan, X), "x": X}, "psec: row 1 of time is NaN, not a finite number"),
@@ -182,7 +186,7 @@ def test_loads_have_the_bits_of_a_stepper_and_their_current(machine: va.Machine)
     assert np.array_equal(by_axis.load_current, constant.load_current)
     with pytest.raises(ValueError, match="loads: axis 'w' is unknown"):
         machine.simulate(psec, loads={"w": 1.0})
-    with pytest.raises(ValueError, match="loads has columns of 2 and 3 values; they need one length"):
+    with pytest.raises(ValueError, match=r"loads have the shapes x \(2,\), y \(3,\); they need one common length"):
         machine.simulate(psec, loads={"x": [0.0] * 2, "y": [0.0] * 3})
     with pytest.raises(ValueError, match="loads: row 0 of x is"):
         machine.simulate(psec, loads={"x": np.inf})
@@ -335,3 +339,36 @@ def test_recorded_signals_are_in_the_table(machine: va.Machine, tmp_path: Path) 
     with (tmp_path / "run.csv").open(newline="") as file:
         header = next(csv.reader(file))
     assert {"time", "x.position", "contour_error", "tool_path.x", "feed"} <= set(header)
+
+
+def test_the_index_of_series_in_a_dictionary_is_the_time(machine: va.Machine) -> None:
+    index = pd.Index(2 * TIMES, name="time")
+    given = {"x": pd.Series(X, index=index), "y": pd.Series(Y, index=index)}
+    np.testing.assert_array_equal(machine.setpoints(given), machine.setpoints(pd.DataFrame(given)))
+    with pytest.raises(ValueError, match="the Series of psec have different indices; align them"):
+        machine.setpoints({"x": pd.Series(X), "y": pd.Series(Y)[::-1]})
+    with pytest.raises(ValueError, match=r"psec has columns of 2 levels, as \('pos', 'x'\)"):
+        machine.setpoints(pd.DataFrame({("pos", "x"): X}))
+
+
+class LabeledRow:
+    """Stand-in for a DataArray of xarray with one value for each axis."""
+
+    def __init__(self, **values: float) -> None:
+        """Stores values by axis."""
+        self.dims, self.ndim = ("axis",), 1
+        self.values = np.array([*values.values()])
+        self.coords = {"axis": types.SimpleNamespace(values=np.array([*values]))}
+
+    def __array__(self, dtype: object = None, copy: object = None) -> np.ndarray:
+        """Returns the values without labels."""
+        return self.values
+
+
+def test_labels_of_a_data_array_name_the_axes(machine: va.Machine) -> None:
+    stepper, row = va.Stepper(machine), LabeledRow(c=0.0, a=0.0, x=1e-4, y=0.0, z=0.0)
+    for _ in range(100):
+        stepper.step(row)
+    np.testing.assert_allclose(stepper.position, [1e-4, 0, 0, 0, 0], atol=1e-6)
+    run = machine.simulate(np.zeros((5, 5)), loads=LabeledRow(c=0.0, x=500.0))
+    assert [run.load_current[:, axis].any() for axis in (0, 4)] == [True, False]

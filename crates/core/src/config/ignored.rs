@@ -26,11 +26,17 @@ pub(super) struct FileFilter<'a> {
 }
 
 impl FileFilter<'_> {
+    /// Returns true for the file of a controller: one with a parameter that only controllers have, or for a controller
+    /// manager.
+    pub fn is_of_controller(&self, assignments: &[Assignment]) -> bool {
+        let has_parameter = || assignments.iter().any(|one| controller::find(&one.key).is_some());
+        !self.is_machine && (self.has_manager || has_parameter())
+    }
+
     /// Removes the ignored parameters from `assignments` and returns the reasons, one for each parameter or group of them.
     ///
-    /// A file with a parameter that only controllers have, or for a controller manager, is the file of a controller. Its
-    /// unknown parameters are ignored in every section, since controllers ignore them, and so are its joints if this machine
-    /// does not have all of them. In a section for several nodes, `joints` without one of this machine, and `machine` without
+    /// Unknown parameters of a controller's file are ignored in every section, since controllers ignore them, and so are its
+    /// joints if this machine does not have all of them. In a section for several nodes, `joints` without one of this machine, and `machine` without
     /// parameters of a machine, are those of another node.
     ///
     /// # Errors
@@ -40,8 +46,7 @@ impl FileFilter<'_> {
         assignments: &mut Vec<Assignment>,
         unusable: Vec<(String, ConfigError)>,
     ) -> Result<Vec<ConfigError>, ConfigError> {
-        let has_parameter = || assignments.iter().any(|one| controller::find(&one.key).is_some());
-        let is_controller = !self.is_machine && (self.has_manager || has_parameter());
+        let is_controller = self.is_of_controller(assignments);
         let mut ignored = Vec::new();
         if !self.is_machine && !is_controller {
             assignments.retain(|one| {
@@ -142,7 +147,7 @@ impl FileFilter<'_> {
         let is_unique = |names: &Vec<String>| names.iter().collect::<HashSet<_>>().len() == names.len();
         let found = found.filter(|names| !names.is_empty() && is_unique(names)).ok_or_else(|| {
             let allowed = format!(
-                "be joints of this machine, {}; a machine file describes other joints with their drives",
+                "be different joints of this machine, {}; a machine file describes other joints with their drives",
                 self.layout.names()
             );
             ConfigError::not_allowed(&one.source, &one.key, &one.value.rounded(), &allowed)

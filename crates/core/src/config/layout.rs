@@ -112,12 +112,20 @@ impl ParameterLayout {
 
     /// Returns the nearest key if `key` looks like a slip of it: in the same group, or with few other characters.
     fn slip(&self, key: &str) -> Option<String> {
+        if is_rclcpp_parameter(key) {
+            return self.qos_counterpart(key);
+        }
         let group = |key: &str| key.split_once('.').map(|(first, _)| first.to_owned());
-        nearest_name(key, self.definitions().map(|(known, _)| known)).filter(|name| {
-            is_rclcpp_parameter(key)
-                || group(key).is_some_and(|first| group(name) == Some(first))
-                || is_slip(key, name)
-        })
+        nearest_name(key, self.definitions().map(|(known, _)| known))
+            .filter(|name| group(key).is_some_and(|first| group(name) == Some(first)) || is_slip(key, name))
+    }
+
+    /// Returns `qos.TOPIC.POLICY` for `qos_overrides./TOPIC.publisher.POLICY`, if this node has it.
+    fn qos_counterpart(&self, key: &str) -> Option<String> {
+        let (topic, policy) = key.strip_prefix("qos_overrides.")?.split_once('.')?;
+        let (topic, policy) = (topic.rsplit('/').next()?, policy.rsplit('.').next()?);
+        let own = format!("qos.{topic}.{policy}");
+        self.definitions().any(|(known, _)| known.to_string() == own).then_some(own)
     }
 
     fn unknown(&self, key: &str, at: &ValueSource) -> ConfigError {

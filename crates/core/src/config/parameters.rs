@@ -166,9 +166,10 @@ impl Parameters {
             is_machine: is_machine_replaced,
             has_manager: file.skipped.iter().any(|path| path.ends_with("/controller_manager")),
         };
+        let is_of_controller = filter.is_of_controller(&assignments);
         let ignored = filter.remove_ignored(&mut assignments, file.unusable)?;
         let is_error = |(key, _): &&(String, ConfigError)| {
-            node.is_none() || is_machine_replaced || !file.shared.contains(key)
+            node.is_none() || is_machine_replaced || !is_of_controller && !file.shared.contains(key)
         };
         if let Some((_, error)) = file.repeated.iter().find(is_error) {
             return Err(error.clone());

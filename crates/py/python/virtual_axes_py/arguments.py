@@ -68,9 +68,12 @@ def to_array(name: str, values: Any) -> NDArray[Any]:
     if isinstance(values, str | bytes):
         raise TypeError(f"{name} is {values!r}; it must have numbers")
     try:
-        return np.asarray(values)
+        array = np.asarray(values)
     except ValueError as error:
         raise ValueError(f"{name} has rows of different lengths") from error
+    if array.dtype.kind == "O" and not array.ndim:
+        raise TypeError(f"{name} is of type {type(values).__name__}; it must have real numbers")
+    return array
 
 
 def to_floats(name: str, values: Any) -> NDArray[np.float64]:
@@ -83,13 +86,11 @@ def to_floats(name: str, values: Any) -> NDArray[np.float64]:
         return np.asarray(np.ma.filled(array.astype(np.float64), np.nan), dtype=np.float64)
     if array.dtype == np.float64:
         return array
-    if array.dtype.kind == "O" and array.ndim:
+    if array.dtype.kind == "O":
         wrong = [one for one in array.flat if one is not None and not isinstance(one, Real | Decimal)]
         if wrong:
             found = f"{reprlib.repr(wrong[0])} of type {type(wrong[0]).__name__}"
             raise TypeError(f"{name} has the element {found}; it must have real numbers")
-    elif array.dtype.kind == "O":
-        raise TypeError(f"{name} is of type {type(values).__name__}; it must have real numbers")
     elif array.dtype.kind not in "buif":
         raise TypeError(f"{name} has elements of type {array.dtype}; it must have real numbers")
     return array.astype(np.float64)
@@ -106,7 +107,7 @@ def to_list(name: str, values: Any) -> list[float]:
 def to_real(name: str, value: Any) -> float:
     """Returns a number; raises `TypeError` for anything else."""
     try:
-        if not isinstance(value, str | bytes):
+        if not isinstance(value, str | bytes | bool | np.bool_):
             return float(value)
     except (TypeError, ValueError, OverflowError):
         pass
@@ -121,9 +122,18 @@ def to_path(name: str, value: Any) -> str:
         raise TypeError(f"{name} is of type {type(value).__name__}; it must be a name or a path") from None
 
 
+def to_text(name: str, value: Any) -> str:
+    """Returns a text; raises `TypeError` for anything else."""
+    if not isinstance(value, str):
+        raise TypeError(f"{name} is {reprlib.repr(value)}; it must be a text")
+    return value
+
+
 def to_whole(name: str, value: Any, least: int, most: int) -> int:
     """Returns an integer; raises `TypeError` for another type, `ValueError` unless it is from `least` to `most`."""
     try:
+        if isinstance(value, bool):
+            raise TypeError
         whole = operator.index(value)
     except TypeError:
         raise TypeError(f"{name} {value!r}: must be an integer") from None

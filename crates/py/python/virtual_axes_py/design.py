@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from numbers import Complex
 from typing import TYPE_CHECKING, Any, Literal
 
 from ._native import PredictionModel, Rst
-from .arguments import to_list, to_native, to_real, to_whole
+from .arguments import to_list, to_native, to_real, to_text, to_whole
 from .machine import Machine
 
 if TYPE_CHECKING:
@@ -95,7 +96,9 @@ def frequency_response(machine: Machine, axis: str, control_loop: ControlLoop = 
     The plant has its deviation; friction, limits, feedforward and delays are left out. Raises `ValueError` for an
     unknown axis or loop, and for the position loop over unstable inner loops.
     """
-    return FrequencyResponse(**to_native(machine).frequency_response(axis, control_loop))
+    return FrequencyResponse(
+        **to_native(machine).frequency_response(to_text("axis", axis), to_text("control_loop", control_loop))
+    )
 
 
 def plot_bode(
@@ -114,6 +117,8 @@ def plot_bode(
     from . import plots
 
     names = machine.axes if axes is None else [axes] if isinstance(axes, str) else list(axes)
+    if not names:
+        raise ValueError(f"axes is empty; it needs one or more of {', '.join(machine.axes)}")
     return plots.plot_bode({name: frequency_response(machine, name, control_loop) for name in names}, ax)
 
 
@@ -122,12 +127,12 @@ def model(machine: Machine, axis: str) -> PredictionModel:
 
     Raises `ValueError` for an unknown axis or inner loops that are unstable.
     """
-    return to_native(machine).prediction_model(axis)
+    return to_native(machine).prediction_model(to_text("axis", axis))
 
 
 def of_machine(machine: Machine, axis: str) -> Rst:
     """Returns the position controller of an axis as the machine file has it, in RST form."""
-    return to_native(machine).controller(axis)
+    return to_native(machine).controller(to_text("axis", axis))
 
 
 def rst(r: Sequence[float], s: Sequence[float], t: Sequence[float], t_first: int = 0) -> Rst:
@@ -196,8 +201,10 @@ def place_poles(
 
     Complex poles come with their conjugates. Raises `ValueError` for too many or unstable poles.
     """
-    if not isinstance(poles, Iterable):
-        raise TypeError(f"poles is {poles!r}; it must be a list, as [0.5, 0.3]")
+    if not isinstance(poles, Iterable) or any(not isinstance(one, Complex) for one in poles):
+        raise TypeError(f"poles is {poles!r}; it must be a list of numbers, as [0.5, 0.3]")
+    if not isinstance(integrator, bool):
+        raise TypeError(f"integrator is {integrator!r}; it must be True or False")
     feedforward = to_real("velocity_feedforward", velocity_feedforward)
     return _model(model).place_poles(list(poles), integrator, feedforward)
 
@@ -240,7 +247,8 @@ def from_control(
     import control
 
     if not isinstance(system, control.TransferFunction | control.StateSpace):
-        raise TypeError(f"system is of type {type(system).__name__}; it must be a TransferFunction or a StateSpace")
+        text = "a TransferFunction or a StateSpace of python-control, as control.tf(numerator, denominator, period)"
+        raise TypeError(f"system is of type {type(system).__name__}; it must be {text}")
     if (system.ninputs, system.noutputs) != (1, 1):
         found = f"{system.ninputs} inputs and {system.noutputs} outputs"
         raise ValueError(f"the system has {found}; it must have one of each: select them, as system[0, 0]")
@@ -253,6 +261,10 @@ def from_control(
     delay = len(denominator) - len(numerator)
     if delay < 0:
         raise ValueError(f"the system has {len(numerator) - 1} zeros and {len(denominator) - 1} poles; at most as many")
+    if delay == 0:
+        raise ValueError(
+            "the output follows the input at once; an axis has a delay of a cycle or more: multiply by 1/z"
+        )
     leading = denominator[0]
     b = [0.0] * delay + [value / leading for value in numerator]
     return PredictionModel([value / leading for value in denominator], b, found_period)
@@ -275,6 +287,7 @@ def _rst(rst: Any) -> Rst:
 
 def _period(dt: float | bool | None, wanted: float | None) -> float:
     """Returns the period of a discrete system, s."""
+    wanted = None if wanted is None else to_real("period", wanted)
     if wanted is not None and not (wanted > 0 and math.isfinite(wanted)):
         raise ValueError(f"period {wanted}: must be above 0 s and finite")
     if dt is True and wanted is not None:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from .arguments import Named, named_errors, read_json, to_native, to_path
+from .arguments import Named, named_errors, read_json, to_native, to_path, to_real, to_text
 from .machine import Machine
+from .run import embedded_page
 from .tables import columns_of, numbers
 
 if TYPE_CHECKING:
@@ -82,6 +83,10 @@ class Identification:
         """Returns the page of `virtual_axes identify --report` as HTML."""
         return self._native.report()
 
+    def _repr_html_(self) -> str:
+        """Returns the report for a notebook."""
+        return embedded_page(self.report())
+
     def __repr__(self) -> str:
         """Returns axis, number of parameters and of findings."""
         axis, values = self.summary["axis"], self.summary["values"]
@@ -138,7 +143,7 @@ def identify(
         "topic": [topic] if isinstance(topic, str) else list(topic),
         "joint": joint,
         "format": format,
-        "rate_hz": rate_hz,
+        "rate_hz": None if rate_hz is None else _rate(rate_hz),
         "cutoff_hz": cutoff_hz,
         "current_lag_ms": current_lag_ms,
         "trace_filter_hz": trace_filter_hz,
@@ -155,13 +160,21 @@ def identify(
     files, both, others = _sources(recordings), _sources(transmission), _sources(validate)
     try:
         with named_errors(options):
-            return Identification(_native.identify(native, axis, files, both, others, options))
+            return Identification(_native.identify(native, to_text("axis", axis), files, both, others, options))
     except ValueError as error:
         # The options of the command have the names of the arguments, with dashes.
         text = str(error)
         for name in options:
             text = text.replace(f"--{name.replace('_', '-')}", name)
         raise ValueError(text) from None
+
+
+def _rate(given: float) -> float:
+    """Returns a sampling rate; raises `ValueError` unless it is above 0 Hz."""
+    rate_hz = to_real("rate_hz", given)
+    if not rate_hz > 0:
+        raise ValueError(f"rate_hz {rate_hz}: must be above 0 Hz")
+    return rate_hz
 
 
 def _sources(given: Recording | Sequence[Recording]) -> list[Source]:
@@ -173,7 +186,7 @@ def _sources(given: Recording | Sequence[Recording]) -> list[Source]:
 def _source(given: Any) -> Source:
     """Returns a recording as the native module takes it: a path, channels, or names and values of columns."""
     if isinstance(given, Mapping) and not hasattr(given, "data_vars"):
-        return {name: _channel(name, values) for name, values in given.items()}
+        return {to_text("channel", name): _channel(name, values) for name, values in given.items()}
     columns = None if isinstance(given, str | os.PathLike) else columns_of("recording", given, skip_texts=True)
     if columns is None and not isinstance(given, str | bytes | os.PathLike):
         text = "it must be a path, a dictionary of channels, or a table, as Run.to_pandas() returns it"

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from .arguments import Named, named_errors, read_json, to_floats, to_path, unknown
+from .arguments import Named, named_errors, read_json, to_floats, to_path, to_text, unknown
 from .run import Run
 from .tables import TIME, axis_columns, axis_values
 
@@ -77,7 +77,7 @@ class Machine:
 
         Raises `ValueError` as `load` does.
         """
-        return Machine(_native.Machine.from_yaml(text, source))
+        return Machine(_native.Machine.from_yaml(to_text("text", text), source))
 
     def with_(self, changes: Mapping[str, Parameter]) -> Machine:
         """Returns a copy with other parameters, checked together.
@@ -180,7 +180,7 @@ class Machine:
         `TypeError` for anything but real numbers.
         """
         given = self.setpoints(psec)
-        if isinstance(signals, str):
+        if signals is not None and (isinstance(signals, str) or not isinstance(signals, Iterable)):
             raise TypeError(f"signals is {signals!r}; it must be a list of names")
         chosen = list(SIGNALS + TOOL_SIGNALS if signals is None else signals)
         wrong = [name for name in chosen if name not in SIGNALS + TOOL_SIGNALS]
@@ -204,13 +204,20 @@ class Machine:
 
     def _loads(self, loads: Loads) -> NDArray[np.float64]:
         """Returns loads as rows of all axes, N or N·m."""
-        columns = None if isinstance(loads, Mapping) else axis_columns(self, "loads", loads)
+        is_row = hasattr(loads, "dims") and np.ndim(loads) == 1
+        if isinstance(loads, Mapping):
+            is_row = not loads or not all(np.ndim(one) == 1 for one in loads.values())
+        columns = None if is_row else axis_columns(self, "loads", loads)
         if columns is None:
-            return np.atleast_2d(axis_values(self.axes, "loads", loads, 0.0))
-        if TIME in columns:
+            rows = np.atleast_2d(axis_values(self.axes, "loads", loads, 0.0))
+        elif TIME in columns:
             raise ValueError("loads has a column time; it needs a row per position cycle, without times")
-        none = np.zeros(len(next(iter(columns.values()))))
-        return np.column_stack([columns.get(axis, none) for axis in self.axes])
+        else:
+            none = np.zeros(len(next(iter(columns.values()))))
+            rows = np.column_stack([columns.get(axis, none) for axis in self.axes])
+        if len(rows) == 0:
+            raise ValueError("loads has no rows; it needs one, or one per position cycle")
+        return rows
 
     def setpoints(self, psec: Setpoints) -> NDArray[np.float64] | _native.Scenario | _native.PartProgram:
         """Returns setpoints as an array (setpoints, axes), m or rad; scenarios and part programs as they are.
@@ -218,13 +225,21 @@ class Machine:
         Raises `ValueError` for an unknown axis, another shape or a value that is not finite; `TypeError` for anything
         but real numbers.
         """
+        return self.named_setpoints("psec", psec)
+
+    def named_setpoints(
+        self, name: str, psec: Setpoints
+    ) -> NDArray[np.float64] | _native.Scenario | _native.PartProgram:
+        """Returns `setpoints` of an argument `name`, for other modules of this package."""
         if isinstance(psec, _native.Scenario | _native.PartProgram):
             return psec
         if isinstance(psec, str | os.PathLike):
-            raise TypeError(f"psec is {psec!r}; a scenario is scenario(name), a part program nc_program(name_or_path)")
-        columns = axis_columns(self, "psec", psec)
+            raise TypeError(
+                f"{name} is {psec!r}; a scenario is scenario(name), a part program nc_program(name_or_path)"
+            )
+        columns = axis_columns(self, name, psec)
         if columns is None:
-            return self._checked(to_floats("psec", psec))
+            return self._checked(to_floats(name, psec))
         if TIME in columns:
             names = [TIME, *(axis for axis in self.axes if axis in columns)]
             _check_times([columns[name] for name in names], names)

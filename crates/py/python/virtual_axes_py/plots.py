@@ -61,7 +61,11 @@ def plot(run: Run, axes: Sequence[str] | None, ax: Iterable[Axes] | None) -> Fig
     """Draws a run over time, as `Run.plot` documents."""
     units = dict(zip(run.machine.axes, run.machine.units))
     moving = [name for name in run.machine.axes if run.figures["axes"][name]["moves"]]
+    if axes is not None and not isinstance(axes, Iterable):
+        raise TypeError(f"axes is {axes!r}; it must be a list of names")
     names = moving if axes is None else [axes] if isinstance(axes, str) else list(axes)
+    if axes is not None and not names:
+        raise ValueError(f"axes is empty; it needs one or more of {', '.join(run.machine.axes)}")
     signals = {name: run.axis(name) for name in names}
     missing = [name for name in ("psec", "position", "current") if name not in run.signals]
     if missing:

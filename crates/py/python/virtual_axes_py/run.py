@@ -293,8 +293,7 @@ class Run:
             page = self.report()
         except (ValueError, OSError):
             return self._table()
-        style = "width: 100%; height: 48em; border: 0"
-        return f'<iframe srcdoc="{escape(page)}" style="{style}" sandbox="allow-scripts"></iframe>'
+        return embedded_page(page)
 
     def _table(self) -> str:
         """Returns the table of the axes as HTML."""
@@ -308,6 +307,12 @@ class Run:
         contour = self.figures["contour_error_um"]
         note = f"<p>contour error: max {contour['max']:.2f} µm, RMS {contour['rms']:.2f} µm</p>" if contour else ""
         return f"<table>{head}{rows}</table>{note}"
+
+
+def embedded_page(page: str) -> str:
+    """Returns a page as an element of a notebook."""
+    style = "width: 100%; height: 48em; border: 0"
+    return f'<iframe srcdoc="{escape(page)}" style="{style}" sandbox="allow-scripts"></iframe>'
 
 
 def _title(setpoints: Any) -> tuple[str, str]:

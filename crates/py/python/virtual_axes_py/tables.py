@@ -77,7 +77,7 @@ def _pairs(name: str, given: Any) -> Iterable[tuple[Any, Any]] | None:
             )
         return _pairs(name, given.to_dataset(dim=texts[0]).reset_coords(drop=True))
     if isinstance(given, Mapping):
-        return given.items()
+        return [*_shared_index(name, given), *given.items()]
     if hasattr(given, "iloc") and hasattr(given, "columns"):
         return _of_pandas(name, given)
     if hasattr(given, "get_columns") and hasattr(given, "columns"):
@@ -87,9 +87,20 @@ def _pairs(name: str, given: Any) -> Iterable[tuple[Any, Any]] | None:
     return None
 
 
+def _shared_index(name: str, given: Mapping[Any, Any]) -> list[tuple[Any, Any]]:
+    """Returns the index of the Series of a dictionary as columns; raises `ValueError` unless it is one for all."""
+    series = [one for one in given.values() if hasattr(one, "iloc") and hasattr(one, "to_frame")]
+    if any(not one.index.equals(series[0].index) for one in series):
+        raise ValueError(f"the Series of {name} have different indices; align them in a DataFrame, or give arrays")
+    return (_of_pandas(name, series[0].to_frame("values")) or [])[:-1] if series else []
+
+
 def _of_pandas(name: str, table: Any) -> list[tuple[Any, Any]] | None:
     """Returns the columns of a DataFrame; None for one without names, whose labels are 0, 1, …"""
-    index = table.index
+    index, levels = table.index, table.columns.nlevels
+    if levels > 1:
+        first = table.columns[0]
+        raise ValueError(f"{name} has columns of {levels} levels, as {first}; it needs one: use table.xs, or join them")
     named = [(name, index.get_level_values(level)) for level, name in enumerate(index.names) if name is not None]
     if not named and index.dtype.kind in "mM":
         named = [(TIME, index)]
@@ -140,14 +151,25 @@ def axis_columns(machine: Machine, name: str, given: Any) -> dict[str, NDArray[n
     return found
 
 
+def _by_label(name: str, given: Any) -> Any:
+    """Returns the values of a DataArray with one dimension by their labels; as they are without labels."""
+    if given.ndim != 1 or given.dims[0] not in given.coords:
+        if given.coords:
+            raise ValueError(f"{name} has the dimensions {', '.join(map(str, given.dims))}; it needs one, with labels")
+        return given.values
+    return dict(zip(given.coords[given.dims[0]].values, given.values))
+
+
 def axis_values(axes: list[str], name: str, given: Any, missing: float | None = None) -> NDArray[np.float64]:
     """Returns values of the axes as an array: of one machine (axes,), of several (machines, axes).
 
-    A dictionary or Series has one value for each axis by name, or one for each machine; `missing` is the value of those
-    that it does not have, which are an error if that is None.
+    A dictionary, Series or DataArray has one value for each axis by name, or one for each machine; `missing` is the
+    value of those that it does not have, which are an error if that is None.
     """
     if isinstance(given, np.ndarray):
         return to_floats(name, given)
+    if hasattr(given, "coords") and hasattr(given, "dims"):
+        given = _by_label(name, given)
     is_series = hasattr(given, "index") and hasattr(given, "items")
     if not (isinstance(given, Mapping) or is_series):
         return to_floats(name, given)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _native
-from .arguments import named_errors, read_json, to_native, to_real, to_whole
+from .arguments import named_errors, read_json, to_native, to_real, to_text, to_whole
 from .machine import Machine
 
 if TYPE_CHECKING:
@@ -85,13 +85,14 @@ def tune(
     options = {
         "controller": chosen,
         "contrast": contrast,
-        "cost": cost,
+        "cost": to_text("cost", cost),
         "modulus_margin": modulus_margin,
         "delay_margin_ms": delay_margin_ms,
         "seed": 1 if seed is None else to_whole("seed", seed, 0, 2**64 - 1),
         "designs": None if designs is None else to_whole("designs", designs, 1, 1_000_000),
     }
-    paths = [named_path(machine, one, f"path {index + 1}") for index, one in enumerate([psec, *also])]
+    paths = [named_path(machine, psec, "path 1")]
+    paths += [named_path(machine, one, f"path {index + 2}", "also") for index, one in enumerate(also)]
     with named_errors(options):
         text, tuned = _native.tune(native, paths[0], paths[1:], options)
     return TuningResult(Machine(tuned), read_json(text))
@@ -127,7 +128,7 @@ def robustness(machine: Machine, psec: Setpoints, *, by: float = 0.3, cost: str 
     Raises `ValueError` with the command's text for an option out of range. Releases the global interpreter lock.
     """
     native, path = to_native(machine), named_path(machine, psec, "path 1")
-    return RobustnessResult(read_json(_native.robustness(native, path, to_real("by", by), cost)))
+    return RobustnessResult(read_json(_native.robustness(native, path, to_real("by", by), to_text("cost", cost))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,13 +196,13 @@ def learn(
     return LearningResult(compensated, read_json(text))
 
 
-def named_path(machine: Machine, psec: Setpoints, name: str) -> tuple[str, str, Any]:
-    """Returns setpoints with their name and description."""
+def named_path(machine: Machine, psec: Setpoints, name: str, argument: str = "psec") -> tuple[str, str, Any]:
+    """Returns setpoints of an argument with their name and description."""
     if isinstance(psec, _native.Scenario):
         return psec.name, psec.description, psec
     if isinstance(psec, _native.PartProgram):
         return psec.path, "", psec
-    return name, "", machine.setpoints(psec)
+    return name, "", machine.named_setpoints(argument, psec)
 
 
 def _controller(machine: Machine) -> str:

@@ -297,6 +297,14 @@ mill:
         assert_eq!(ignored(&format!("{slip}:=1")), None, "{slip}");
     }
     assert!(ignored("start_type_description_service:=false").is_some());
+    for (foreign, own) in [
+        ("/joint_states.publisher.durability", "; the nearest is qos.joint_states.durability"),
+        ("/joint_states.publisher.history", ""),
+        ("/parameter_events.publisher.reliability", ""),
+    ] {
+        let reason = format!("-p: unknown parameter qos_overrides.{foreign}{own}");
+        assert_eq!(ignored(&format!("qos_overrides.{foreign}:=volatile")), Some(reason));
+    }
     assert!(
         ignored("gains.x.p:=2.0")
             .is_some_and(|reason| reason.starts_with("-p: gains.x.p = 2: must be omitted"))
@@ -339,6 +347,9 @@ mill:
             "site.yaml:6: duplicate parameter x.velocity_loop.gain, first set at site.yaml:4",
         ]
     );
+    let controller = "mill:\n  ros__parameters:\n    joints: [x]\n    command_interfaces: [position]\n    joints: [y, x]\n";
+    let (_, warnings) = overlaid(controller).expect("as a controller reads it");
+    assert_eq!(warnings, ["site.yaml:5: duplicate parameter joints, first set at site.yaml:3"]);
     let own = "mill:\n  ros__parameters:\n    x.velocity_loop.gain: 4\n    x.velocity_loop.gain: 5\n";
     let error = "site.yaml:4: duplicate parameter x.velocity_loop.gain, first set at site.yaml:3";
     assert_eq!(overlaid(own).map(|_| ()), Err(error.to_owned()));
