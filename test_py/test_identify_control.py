@@ -150,6 +150,36 @@ def test_parameters_and_times_are_those_of_the_control(tmp_path: Path, probe: Pa
     assert max(map(abs, times)) < TIME, text
 
 
+def identified(folder: Path, machine: str, *settings: str) -> dict[str, float]:
+    """Returns the values identified from the setpoints of the profile `linuxcnc` for the probe program."""
+    probe, log = folder / "probe.nc", folder / "log.csv"
+    options = ["--machine", machine, *OFFSET]
+    sets = ["periods.position_ms=1", "control.profile=linuxcnc", *settings]
+    command("psec", "--probe", *options, "--out", probe)
+    command("psec", probe, *options, *(word for text in sets for word in ("--set", text)), "--out", log)
+    found = json.loads(command("identify-control", probe, log, *options, "--json"))
+    return {value["parameter"]: value["value"] for value in found["values"]}
+
+
+def test_limits_of_rotary_axes_are_identified(tmp_path: Path) -> None:
+    truth = {
+        "a.limits.velocity_rpm": 9.0,
+        "a.limits.acceleration_rev_s2": 0.6,
+        "c.limits.velocity_rpm": 16.0,
+        "c.limits.acceleration_rev_s2": 0.7,
+    }
+    found = identified(tmp_path, "mikron_ucp710", *(f"{key}={value}" for key, value in truth.items()))
+    for key, value in truth.items():
+        assert abs(found[key] / value - 1) < 1e-3, found
+
+
+def test_gaps_of_short_lines_change_no_other_parameter(tmp_path: Path) -> None:
+    base, found = (identified(tmp_path, "vmc", f"control.gap_cycles={cycles}") for cycles in (0, 40))
+    assert base.keys() == found.keys()
+    for key, value in base.items():
+        assert abs(found[key] / value - 1) < 1e-3, key
+
+
 def main(first: int, end: int) -> None:
     """Prints the distribution of the errors over seeds."""
     import tempfile

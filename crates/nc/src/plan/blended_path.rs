@@ -126,11 +126,13 @@ impl BlendedPath {
                 6.0 * CORNER_USED * tolerance[i].min(before.tolerance[i]) / norm(&turn, joints)
             };
             let distance = of(0, &kinds.linear).min(of(1, &kinds.rotary));
-            let bound = self.largest.min(CORNER_FRACTION * length);
+            let bound = WIDEST_DISTANCE.min(CORNER_FRACTION * length);
             let is_long = distance <= bound || bound >= self.usual;
             let is_straight = before.curve.is_line() && curve.is_line();
             (is_straight && is_long && distance > MIN_DISTANCE).then_some(distance.min(bound))
         });
+        // Corners of small angles need long distances.
+        self.largest = self.largest.max(corner.unwrap_or(0.0));
         self.length += curve.length;
         self.members.push_back(Member { start, curve, tolerance, corner });
     }
@@ -147,7 +149,10 @@ impl BlendedPath {
 
     /// Returns true if the next piece can be computed.
     pub fn is_ready(&self) -> bool {
-        self.is_closed || self.length >= self.planned + 4.0 * self.largest
+        // A corner at the end of a line takes up to half of it.
+        let last =
+            self.members.back().filter(|last| last.curve.is_line()).map_or(0.0, |last| last.curve.length);
+        self.is_closed || self.length - 2.0 * CORNER_FRACTION * last >= self.planned + 4.0 * self.largest
     }
 
     /// Returns the next piece; `None` after the last one. The path must be ready.

@@ -164,6 +164,14 @@ pub(super) fn motions(
     motions
 }
 
+/// Returns the peak of the rate in the fastest motion from standstill to standstill over `length` without a part of constant
+/// rate.
+pub(super) fn peak_rate(length: f64, acceleration: f64, jerk: f64) -> f64 {
+    let full = acceleration / jerk;
+    let peak = 0.5 * acceleration * ((full * full + 4.0 * length / acceleration).sqrt() - full);
+    if peak < acceleration * full { (0.25 * length * length * jerk).cbrt() } else { peak }
+}
+
 /// Returns the fastest motion from standstill to standstill along a straight line with limits of rate, acceleration and
 /// jerk: up to seven motions of constant jerk.
 pub(super) fn straight_line(length: f64, limits: [f64; 3]) -> Vec<IntervalMotion> {
@@ -177,13 +185,7 @@ pub(super) fn straight_line(length: f64, limits: [f64; 3]) -> Vec<IntervalMotion
         let (jerk_time, constant) = ramp(peak);
         peak * (2.0 * jerk_time + constant)
     };
-    let mut peak = rate;
-    if ramps_length(rate) > length {
-        peak = 0.5 * acceleration * ((full * full + 4.0 * length / acceleration).sqrt() - full);
-        if peak < acceleration * full {
-            peak = (0.25 * length * length * jerk).cbrt();
-        }
-    }
+    let peak = if ramps_length(rate) > length { peak_rate(length, acceleration, jerk) } else { rate };
     let (jerk_time, constant) = ramp(peak);
     let cruise = ((length - ramps_length(peak)) / peak).max(0.0);
     let phases = [

@@ -88,7 +88,7 @@ impl<'a> LookAhead<'a> {
     /// Returns the joints at the start of the program, or `None` if it has no motion.
     pub fn start(&mut self) -> Result<Option<JointVector>, FeedPlanError> {
         while self.trapezoid.is_none() && !self.is_finished && self.last_piece.is_none() {
-            self.extend(self.entries.len(), 0.0)?;
+            self.read_pieces(self.entries.len(), 0.0)?;
         }
         while self.trapezoid.is_some() && self.entries.iter().all(|entry| entry.piece.is_none()) {
             if !self.extend_trapezoid()? {
@@ -128,7 +128,9 @@ impl<'a> LookAhead<'a> {
             if self.is_finished && count == self.entries.len() {
                 return Ok(());
             }
-            self.extend(count, HORIZON * stopping)?;
+            // A window from a standstill is longer than the part of it that remains as it is.
+            let kept_time = if count == 0 || ends_at_stop { reserve } else { 0.0 };
+            self.extend(count, kept_time)?;
             if self.entries.len() == count {
                 return Ok(());
             }
@@ -176,15 +178,21 @@ impl<'a> LookAhead<'a> {
         interval.cap / acceleration + acceleration / jerk
     }
 
-    /// Reads pieces until the entries from `from` on last about `time` or end at a stop.
+    /// Reads pieces until the entries from `from` on last `time` and the horizon of their stopping time, or end at a stop.
     fn extend(&mut self, from: usize, time: f64) -> Result<(), FeedPlanError> {
-        let result = self.read_pieces(from, time);
-        let intervals = self.entries.iter().filter_map(|entry| entry.interval.as_ref());
-        self.stopping_time =
-            intervals.map(|interval| self.interval_stopping_time(interval)).fold(0.0, f64::max);
-        result
+        loop {
+            let stopping = self.stopping_time;
+            self.read_pieces(from, time + HORIZON * stopping)?;
+            let intervals = self.entries.iter().filter_map(|entry| entry.interval.as_ref());
+            self.stopping_time =
+                intervals.map(|interval| self.interval_stopping_time(interval)).fold(0.0, f64::max);
+            if self.stopping_time <= stopping {
+                return Ok(());
+            }
+        }
     }
 
+    /// Reads pieces until the entries from `from` on last about `time` or end at a stop.
     fn read_pieces(&mut self, from: usize, time: f64) -> Result<(), FeedPlanError> {
         let mut ahead = 0.0;
         let rate_time = |interval: &Interval| interval.length / interval.cap.max(f64::MIN_POSITIVE);

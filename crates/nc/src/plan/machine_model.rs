@@ -2,6 +2,7 @@
 
 use virtual_axes_core::config::LimitsConfig;
 
+use super::interval_motion::peak_rate;
 use super::motion_curve::Shape;
 use super::piece::{FeedChange, Piece, PieceCurve};
 use super::vector::{Jet, JointKinds, TipToJoints, norm};
@@ -50,9 +51,14 @@ fn is_continued(rate: Option<f64>, neighbor: Option<f64>) -> bool {
     matches!((rate, neighbor), (Some(a), Some(b)) if (a - b).abs() <= STEADY_CHANGE * a.max(b))
 }
 
+/// Returns the time of a jerk phase of the fastest ramp from standstill to `rate`.
+fn phase_time(rate: f64, acceleration: f64, jerk: f64) -> f64 {
+    (acceleration / jerk).min((rate / jerk).sqrt())
+}
+
 /// Returns the distance of the fastest ramp from standstill to `rate`.
 fn ramp_distance(rate: f64, acceleration: f64, jerk: f64) -> f64 {
-    let phase = (acceleration / jerk).min((rate / jerk).sqrt());
+    let phase = phase_time(rate, acceleration, jerk);
     0.5 * rate * (rate / (jerk * phase) + phase)
 }
 
@@ -151,7 +157,10 @@ impl MachineModel {
         let (node, cap) = self.node(piece, 0.0);
         let [acceleration, jerk] = self.tangential_near_start(piece, &node);
         let from_stop = around.from_stop;
-        let phase = (acceleration / jerk).min((cap / jerk).sqrt());
+        // The distance between two stops, if it is known, limits the rate.
+        let between = piece.to_stop.map_or(f64::INFINITY, |to_stop| from_stop + piece.length + to_stop);
+        let peak = peak_rate(between, acceleration, jerk);
+        let phase = phase_time(cap.min(peak), acceleration, jerk);
         let most = 0.05 * piece.length;
         let rest = (jerk * (REST_FRACTION * phase).powi(3) / 6.0).clamp(LEAST_REST.min(most), most);
         let middle = self.node(piece, 0.5 * piece.length).1.min(cap);
@@ -171,9 +180,11 @@ impl MachineModel {
         };
         let largest = largest.max(piece.length / MAX_PARTS as f64);
         let ramp = ramp_distance(middle, acceleration, jerk);
-        let fine = (PHASE_FRACTION * middle * acceleration / jerk)
-            .max(RAMP_FRACTION * ramp)
-            .max(piece.length / MAX_PARTS as f64);
+        let fine = match peak < middle {
+            true => PHASE_FRACTION * peak * phase_time(peak, acceleration, jerk),
+            false => (PHASE_FRACTION * middle * acceleration / jerk).max(RAMP_FRACTION * ramp),
+        };
+        let fine = fine.max(piece.length / MAX_PARTS as f64);
         let [before, steady, after] = around.steady;
         let is_steady = steady.is_some() && ramp < STEADY_RAMP * piece.length;
         let is_graded = [before, after].map(|neighbor| !is_continued(steady, neighbor));

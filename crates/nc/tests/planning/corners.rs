@@ -44,6 +44,28 @@ fn corners_are_passed_at_the_tolerance() {
 }
 
 #[test]
+fn corners_of_any_angle_are_passed_at_the_tolerance() {
+    let machine = fine_machine();
+    let leg = 0.02;
+    for turn in [10.0_f64, 30.0, 60.0, 90.0, 120.0, 150.0] {
+        let (sine, cosine) = turn.to_radians().sin_cos();
+        for tolerance in [10e-6, 50e-6, 200e-6] {
+            // Half a millimeter per second at the tolerance of 10 µm: the chords of the setpoints are far below it.
+            let mut program = Program::new(50.0 * tolerance, blend(tolerance));
+            program.line(leg, 0.0, 0.0).line(leg + leg * cosine, leg * sine, 0.0);
+            let outcome = plan_on(&machine, &program, PlanOptions::default(), |_| 1.0).unwrap();
+            outcome.audit.assert_kept();
+            let points: Vec<_> = outcome.setpoints.iter().map(|s| [s.psec()[0], s.psec()[1]]).collect();
+            let found = distance([leg, 0.0], &points);
+            println!("turn {turn}°, P {:.0} µm: {:.2} µm", 1e6 * tolerance, 1e6 * found);
+            // Two knots of a quarter of the line on either side of the corner: h |ΔT| / 6.
+            let wanted = tolerance.min(0.25 * leg * 2.0 * (0.5 * turn.to_radians()).sin() / 6.0);
+            assert!((found - wanted).abs() < 0.01 * wanted, "{turn}°, {tolerance}: {found} m, {wanted} m");
+        }
+    }
+}
+
+#[test]
 fn a_wide_tolerance_is_used_as_far_as_the_lines_are_long() {
     let machine = fine_machine();
     let mut before = 0.0;

@@ -1,24 +1,37 @@
-//! Relaxed limits: planning takes work in proportion to the path.
+//! Relaxed limits: the motion is not longer, and planning takes work in proportion to the path.
 
+use proptest::prelude::*;
 use virtual_axes_core::config::{MachineConfig, Parameters, ValueSource};
 use virtual_axes_nc::motion::PathControl;
 use virtual_axes_nc::plan::{PartProgramPlanner, PlanOptions};
 
 use crate::programs::{Program, Step, blend};
+use crate::random::{controls, draws, program};
 
-/// Returns the embedded machine with a velocity limit of X, Y and Z, m/s.
-fn machine(velocity: f64) -> MachineConfig {
+/// Velocity, acceleration and jerk of X, Y and Z in SI units.
+type AxisLimits = [[f64; 3]; 3];
+
+/// Returns the embedded machine with other limits of X, Y and Z.
+fn machine(limits: &AxisLimits) -> MachineConfig {
     let mut parameters = Parameters::embedded_default().unwrap();
-    for axis in ["x", "y", "z"] {
+    for (axis, [velocity, acceleration, jerk]) in ["x", "y", "z"].into_iter().zip(limits) {
         for text in [
             format!("{axis}.limits.velocity_m_min={}", 60.0 * velocity),
-            format!("{axis}.limits.acceleration_m_s2=1.48"),
-            format!("{axis}.limits.jerk_m_s3=2980"),
+            format!("{axis}.limits.acceleration_m_s2={acceleration}"),
+            format!("{axis}.limits.jerk_m_s3={jerk}"),
         ] {
             parameters.set_text(&text, &ValueSource::named("test")).unwrap();
         }
     }
     parameters.machine_config().unwrap()
+}
+
+/// Returns the duration, s, and the number of intervals planned.
+fn plan(program: &Program, limits: &AxisLimits) -> (f64, u64) {
+    let steps: Box<dyn Iterator<Item = Step>> = Box::new(program.iter());
+    let mut planner = PartProgramPlanner::new(steps, &machine(limits), PlanOptions::default()).unwrap();
+    while planner.next_setpoint(1.0).unwrap().is_some() {}
+    (planner.path_time(), planner.planned_intervals())
 }
 
 #[test]
@@ -28,16 +41,57 @@ fn planning_takes_work_in_proportion_to_the_path_whatever_the_limits() {
     program.rapid([-0.3, -0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     program.control = PathControl::ExactPath;
     program.arc([-0.29, -0.199], -3.0, 0.0);
-    let plan = |velocity: f64| {
-        let steps: Box<dyn Iterator<Item = Step>> = Box::new(program.iter());
-        let mut planner = PartProgramPlanner::new(steps, &machine(velocity), PlanOptions::default()).unwrap();
-        while planner.next_setpoint(1.0).unwrap().is_some() {}
-        (planner.path_time(), planner.planned_intervals())
-    };
+    let plan = |velocity: f64| plan(&program, &[[velocity, 1.48, 2980.0]; 3]);
     let (time, work) = plan(0.4);
     for velocity in [1.2, 4.0, 30.0] {
         let (found, found_work) = plan(velocity);
         assert!(found <= 1.002 * time, "{velocity} m/s: {found} s, {time} s at 0.4 m/s");
         assert!(found_work < 20 * work, "{velocity} m/s: {found_work} intervals, {work} at 0.4 m/s");
+    }
+}
+
+#[test]
+fn planning_takes_the_same_work_at_any_jerk_limit() {
+    let mut program = Program::new(0.1, blend(10e-6));
+    program.line(0.02, 0.0, 0.0).line(0.02, 0.02, 0.0).arc([0.01, 0.02], 3.0, 0.0);
+    program.line(0.0, 0.03, -0.01).line(0.0, 0.0, 0.0);
+    let work = |jerk: f64| plan(&program, &[[0.5, 2.5, jerk]; 3]).1;
+    let least = work(1e3);
+    for jerk in [1e4, 1e5, 1e6, 1e7] {
+        let found = work(jerk);
+        assert!(found < 4 * least, "{jerk} m/s³: {found} intervals, {least} at 1000 m/s³");
+    }
+}
+
+/// Relative tolerance of the planned time: the planner's own, and that of its intervals, which depend on the limits.
+const TOLERANCE: f64 = 5e-3;
+
+/// Returns the limits of an axis: velocity 0.2 to 1 m/s, acceleration 1 to 10 m/s², jerk 30 to 10 000 m/s³.
+fn axis_limits() -> impl Strategy<Value = [f64; 3]> {
+    (-0.7..0.0f64, 0.0..1.0f64, 1.5..4.0f64)
+        .prop_map(|exponents| [exponents.0, exponents.1, exponents.2].map(|exponent| 10f64.powf(exponent)))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, max_shrink_iters: 100, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_relaxed_limit_lengthens_the_motion(
+        draws in draws(10), feed in -2.5..-0.5f64, control in controls(), limits in [axis_limits(), axis_limits(), axis_limits()],
+        factor in 1.05..8.0f64,
+    ) {
+        let feed = 10f64.powf(feed);
+        let drawn = program(&draws, feed, control);
+        let (time, _) = plan(&drawn, &limits);
+        let (found, _) = plan(&program(&draws, factor * feed, control), &limits);
+        prop_assert!(found <= (1.0 + TOLERANCE) * time, "feed: {} s, {} s before", found, time);
+        for axis in 0..limits.len() {
+            for (order, name) in ["velocity", "acceleration", "jerk"].into_iter().enumerate() {
+                let mut relaxed = limits;
+                relaxed[axis][order] *= factor;
+                let (found, _) = plan(&drawn, &relaxed);
+                prop_assert!(found <= (1.0 + TOLERANCE) * time, "{} {}: {} s, {} s before", axis, name, found, time);
+            }
+        }
     }
 }
