@@ -144,7 +144,9 @@ impl State {
 
     /// Sets spindle and tool: S, T, M6, M61, M3, M4, M5, M13, M14, G96, G97.
     fn set_spindle_and_tool(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
-        let mut speed = block.take_rate('S')?;
+        // S of a dwell is its time.
+        let is_dwell = self.dialect == Dialect::Grbl && codes.g.action == Some(Action::Dwell);
+        let mut speed = if is_dwell { None } else { block.take_rate('S')? };
         match codes.g.spindle_mode {
             Some(SpindleMode::SurfaceSpeed) => {
                 self.modal.has_surface_speed = true;
@@ -234,6 +236,11 @@ impl State {
         }
         if self.dialect == Dialect::Okuma
             && let Some(time) = block.take_rate('F')?
+        {
+            return Ok(Some(time));
+        }
+        if self.dialect == Dialect::Grbl
+            && let Some(time) = block.take_rate('S')?
         {
             return Ok(Some(time));
         }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::activity::ProgramStop;
 use super::error::FeedPlanError;
 use super::interval_motion::{IntervalMotion, Law, motions, straight_line};
-use super::machine_model::{MachineModel, Surroundings};
+use super::machine_model::{MachineModel, Surroundings, is_continued};
 use super::piece::{Piece, PieceCurve};
 use super::pieces::PieceSource;
 use super::planned_interval::PlannedInterval;
@@ -20,7 +20,7 @@ use super::window::{Interval, Stations, Window, WindowStart};
 const MAX_INTERVALS: usize = 6000;
 /// Time ahead at which the window is planned again, and time up to which the path is read, in stopping times.
 const RENEWAL: f64 = 2.0;
-const HORIZON: f64 = 5.0;
+const HORIZON: f64 = 10.0;
 /// Smallest number of intervals between two stops.
 const MIN_INTERVALS: usize = 6;
 /// Plans of one window with reduced limits before it is rejected.
@@ -51,10 +51,11 @@ pub(super) struct LookAhead<'a> {
     is_finished: bool,
     from_stop: f64,
     last_piece: Option<Arc<Piece>>,
-    /// Piece or standstill behind the last entry, read for the division of that before it.
-    next: Option<Part<Arc<Piece>>>,
-    /// Constant rates of the last piece and of the next one, where they are steady.
-    steady: [Option<f64>; 2],
+    /// Pieces and standstills behind the last entry, read for the division of those before them, with the constant rate
+    /// of a steady piece.
+    next: VecDeque<(Part<Arc<Piece>>, Option<f64>)>,
+    /// Constant rate of the last piece, where it is steady, and distance to its end in which the rate continues.
+    steady: (Option<f64>, f64),
     /// Time of a stop from the highest rate in the window, s.
     stopping_time: f64,
     /// Planned time above which the window is not planned again, since that failed or the window is full, s.
@@ -76,8 +77,8 @@ impl<'a> LookAhead<'a> {
             is_finished: false,
             from_stop: 0.0,
             last_piece: None,
-            next: None,
-            steady: [None; 2],
+            next: VecDeque::new(),
+            steady: (None, 0.0),
             stopping_time: 0.0,
             retry_time: f64::INFINITY,
             feed_factor: 1.0,
@@ -203,13 +204,14 @@ impl<'a> LookAhead<'a> {
             }
         }
         while self.entries.len() < MAX_INTERVALS {
-            match self.next_part()? {
-                None => {
-                    self.is_finished = true;
-                    return Ok(());
-                }
-                Some(Part::Stop(ProgramStop { time: 0.0, .. })) => {}
-                Some(Part::Stop(ProgramStop { time, activity })) => {
+            self.read_next(0)?;
+            let Some((part, steady)) = self.next.pop_front() else {
+                self.is_finished = true;
+                return Ok(());
+            };
+            match part {
+                Part::Stop(ProgramStop { time: 0.0, .. }) => {}
+                Part::Stop(ProgramStop { time, activity }) => {
                     let piece = self.last_piece.clone();
                     self.push_motions(piece.as_ref(), vec![IntervalMotion::dwell(time)]);
                     if let Some(entry) = self.entries.back_mut() {
@@ -217,13 +219,13 @@ impl<'a> LookAhead<'a> {
                     }
                     return Ok(());
                 }
-                Some(Part::Path(piece)) => {
+                Part::Path(piece) => {
                     self.last_piece = Some(Arc::clone(&piece));
                     if let Some(motions) = self.straight(&piece) {
                         self.push_motions(Some(&piece), motions);
                         return Ok(());
                     }
-                    let around = self.surroundings(&piece)?;
+                    let around = self.surroundings(&piece, steady)?;
                     let entries = &mut self.entries;
                     self.model.divide(&piece, &around, |from, interval| {
                         ahead += rate_time(&interval);
@@ -251,35 +253,40 @@ impl<'a> LookAhead<'a> {
         Ok(())
     }
 
-    /// Returns the next piece or standstill.
-    fn next_part(&mut self) -> Result<Option<Part<Arc<Piece>>>, FeedPlanError> {
-        if self.next.is_some() {
-            return Ok(self.next.take());
+    /// Reads pieces and standstills up to `index` of those behind the last entry, if the program has as many.
+    fn read_next(&mut self, index: usize) -> Result<(), FeedPlanError> {
+        while self.next.len() <= index {
+            let part = match self.source.next()? {
+                None => break,
+                Some(Part::Stop(standstill)) => (Part::Stop(standstill), None),
+                Some(Part::Path(mut piece)) => {
+                    piece.scale_feed(self.feed_factor);
+                    let steady = self.model.steady_rate(&piece);
+                    (Part::Path(Arc::new(piece)), steady)
+                }
+            };
+            self.next.push_back(part);
         }
-        Ok(self.source.next()?.map(|part| match part {
-            Part::Stop(standstill) => Part::Stop(standstill),
-            Part::Path(mut piece) => {
-                piece.scale_feed(self.feed_factor);
-                Part::Path(Arc::new(piece))
-            }
-        }))
+        Ok(())
     }
 
-    /// Returns the surroundings of the piece that was read last, and reads the one behind it.
-    fn surroundings(&mut self, piece: &Piece) -> Result<Surroundings, FeedPlanError> {
-        let [before, steady] = match self.from_stop > 0.0 {
-            true => self.steady,
-            false => [None, self.model.steady_rate(piece)],
-        };
-        let mut after = None;
-        if !piece.is_stop {
-            self.next = self.next_part()?;
-            if let Some(Part::Path(next)) = &self.next {
-                after = self.model.steady_rate(next);
+    /// Returns the surroundings of the piece that was read last, and reads those behind it that its division depends on.
+    fn surroundings(&mut self, piece: &Piece, steady: Option<f64>) -> Result<Surroundings, FeedPlanError> {
+        let is_start = self.from_stop == 0.0;
+        let before = if !is_start && is_continued(steady, self.steady.0) { self.steady.1 } else { 0.0 };
+        self.steady = (steady, before + piece.length);
+        let (mut after, mut index, mut is_stop, mut rate) = (0.0, 0, piece.is_stop, steady);
+        let reach = self.model.reach(piece);
+        while !is_stop && rate.is_some() && after < reach {
+            self.read_next(index)?;
+            let Some((Part::Path(next), next_rate)) = self.next.get(index) else { break };
+            if !is_continued(rate, *next_rate) {
+                break;
             }
+            after += next.length;
+            (rate, is_stop, index) = (*next_rate, next.is_stop, index + 1);
         }
-        self.steady = [steady, after];
-        Ok(Surroundings { from_stop: self.from_stop, steady: [before, steady, after] })
+        Ok(Surroundings { from_stop: self.from_stop, is_steady: steady.is_some(), constant: [before, after] })
     }
 
     /// Returns the closed-form motion if `piece` is a straight line of the joints from standstill to standstill.

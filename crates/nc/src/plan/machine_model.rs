@@ -16,11 +16,10 @@ const REST_FRACTION: f64 = 1.0 / 6.0;
 /// fraction of the distance of the ramp: a jerk phase that is shorter takes one or two intervals.
 const PHASE_FRACTION: f64 = 1.0 / 8.0;
 const RAMP_FRACTION: f64 = 1.0 / 64.0;
-/// Fraction of the acceleration and jerk limits up to which the feed of a steady piece needs no ramp, largest relative
-/// change of its bound, and largest distance of a ramp as a fraction of the piece.
-const STEADY_LOAD: f64 = 0.5;
-const STEADY_CHANGE: f64 = 0.01;
-const STEADY_RAMP: f64 = 1.0;
+/// Fraction of the acceleration and jerk limits up to which the feed of a steady piece needs no ramp, and largest
+/// relative change of its bound.
+const STEADY_LOAD: f64 = 0.9;
+const STEADY_CHANGE: f64 = 0.003;
 /// Intervals per spline piece, and where adjacent pieces differ in length: near corners.
 const PARTS: usize = 3;
 const GRADED_PARTS: usize = 4;
@@ -42,12 +41,13 @@ pub(super) const SHARE: f64 = 0.995;
 pub(super) struct Surroundings {
     /// Distance of the start of the piece from the last stop.
     pub from_stop: f64,
-    /// Constant rates of the piece before, of the piece and of the piece after it, where they are steady.
-    pub steady: [Option<f64>; 3],
+    /// True if the piece is steady, and distances before and after it in which its rate continues.
+    pub is_steady: bool,
+    pub constant: [f64; 2],
 }
 
 /// Returns true if a steady piece continues with the rate of its neighbor.
-fn is_continued(rate: Option<f64>, neighbor: Option<f64>) -> bool {
+pub(super) fn is_continued(rate: Option<f64>, neighbor: Option<f64>) -> bool {
     matches!((rate, neighbor), (Some(a), Some(b)) if (a - b).abs() <= STEADY_CHANGE * a.max(b))
 }
 
@@ -152,6 +152,13 @@ impl MachineModel {
         (high - low <= STEADY_CHANGE * high && nodes.iter().all(|(node, _)| is_within(node))).then_some(low)
     }
 
+    /// Returns the distance behind a steady piece up to which its division depends on the path.
+    pub fn reach(&self, piece: &Piece) -> f64 {
+        let (node, cap) = self.node(piece, 0.0);
+        let [acceleration, jerk] = self.tangential_near_start(piece, &node);
+        ramp_distance(cap, acceleration, jerk) + (1.0 + GROWTH) / GROWTH * piece.length
+    }
+
     /// Divides a piece into intervals. `push` receives the start of each, from the start of the piece, and the interval.
     pub fn divide(&self, piece: &Piece, around: &Surroundings, mut push: impl FnMut(f64, Interval)) {
         let (node, cap) = self.node(piece, 0.0);
@@ -185,17 +192,16 @@ impl MachineModel {
             false => (PHASE_FRACTION * middle * acceleration / jerk).max(RAMP_FRACTION * ramp),
         };
         let fine = fine.max(piece.length / MAX_PARTS as f64);
-        let [before, steady, after] = around.steady;
-        let is_steady = steady.is_some() && ramp < STEADY_RAMP * piece.length;
-        let is_graded = [before, after].map(|neighbor| !is_continued(steady, neighbor));
-        // In a steady piece, only the ramps of its neighbors are divided finely.
+        // In a steady piece, only the ramps of its surroundings are divided finely.
+        let widest = if matches!(piece.curve, PieceCurve::Exact(_)) { largest } else { piece.length };
         let in_ramps = |u: f64| {
-            if !is_steady {
-                return fine;
+            let usual = fine.min(largest);
+            if !around.is_steady {
+                return usual;
             }
-            let sides = [u, piece.length - u].into_iter().zip(is_graded).filter(|(_, is_graded)| *is_graded);
-            let outside = sides.map(|(distance, _)| distance - ramp).fold(f64::INFINITY, f64::min);
-            fine + GROWTH / (1.0 + GROWTH) * outside.max(0.0)
+            let [before, after] = around.constant;
+            let outside = (before + u).min(after + piece.length - u) - ramp;
+            (usual + GROWTH / (1.0 + GROWTH) * outside.max(0.0)).min(widest)
         };
         let changes = self.feed_changes(piece, &node, PHASE_FRACTION * acceleration / jerk);
         let step = |u: f64| {
@@ -207,7 +213,7 @@ impl MachineModel {
                 true => (interval + GROWTH * (at - u)) / (1.0 + GROWTH),
                 false => interval + GROWTH * (u - at),
             });
-            graded.fold(largest.min(in_ramps(u)).min(after).min(before), f64::min)
+            graded.fold(in_ramps(u).min(after).min(before), f64::min)
         };
         let mut ends = (node, cap);
         let mut u = 0.0;

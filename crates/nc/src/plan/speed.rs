@@ -28,6 +28,10 @@ const DUAL: f64 = 2e-3;
 const GUESS: f64 = 0.5;
 const GUESS_JERK: f64 = 0.1;
 const MIN_GUESS: f64 = 0.02;
+/// Duality gap of the first guess relative to the time, and its smallest slack: with less, multipliers of constraints
+/// that the guess violates would take many iterations to become feasible.
+const GAP_GUESS: f64 = 0.5;
+const SLACK_GUESS: f64 = 0.3;
 /// Fraction of the way to the boundary per iteration: of slacks and multipliers, and of coefficients.
 const TO_BOUNDARY: f64 = 0.99;
 const COEFFICIENT_TO_ZERO: f64 = 0.7;
@@ -249,12 +253,12 @@ impl SpeedSolver {
         let weighted = self.sections.iter().zip(&self.coefficients[1..]);
         let time: f64 = weighted.map(|(section, c)| section.weight / c.sqrt()).sum();
         let sides = 2.0 * self.count as f64;
-        let mut barrier = 0.2 * time / sides;
+        let mut barrier = GAP_GUESS * time / sides;
         for block in &mut self.blocks {
             for i in 0..LANES {
                 let is_used = (0..3).any(|k| block.form[k][i] != 0.0);
                 for (side, excess) in [block.value[i] - 1.0, -block.value[i] - 1.0].into_iter().enumerate() {
-                    block.slacks[side][i] = (-excess).max(0.05);
+                    block.slacks[side][i] = (-excess).max(SLACK_GUESS);
                     block.multipliers[side][i] = if is_used { barrier / block.slacks[side][i] } else { 0.0 };
                 }
             }

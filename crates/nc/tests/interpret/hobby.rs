@@ -148,3 +148,13 @@ fn the_center_word_across_the_plane_is_unused() {
     assert!(run(arc, Dialect::LinuxCnc).expect_err("rejected").contains("word K"));
     assert!(run(&arc.replace("K0.000", "K2"), Dialect::Fanuc).expect_err("rejected").contains("word K"));
 }
+
+#[test]
+fn a_dwell_of_firmware_has_its_time_by_s() {
+    let options = || InterpreterOptions { dialect: Some(Dialect::Grbl), ..InterpreterOptions::default() };
+    let dwells: Vec<f64> = events("G21 G90\nM3 S500\nG4 S1.5\nG4 P2\nG1 X1 F100\nM2\n", options())
+        .into_iter()
+        .filter_map(|(_, event)| if let ProgramEvent::Dwell(time) = event { Some(time) } else { None })
+        .collect();
+    assert_eq!(dwells, [1.5, 2.0]);
+}

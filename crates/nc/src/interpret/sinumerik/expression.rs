@@ -164,7 +164,10 @@ impl BlockScanner<'_> {
             "ISVAR" => return self.is_variable(names),
             _ => {}
         }
-        if self.peek() == Some(b'(') && !names.is_defined(name) {
+        // Behind an R parameter a parenthesis begins a remark.
+        let is_parameter =
+            name.strip_prefix('R').is_some_and(|digits| digits.bytes().all(|byte| byte.is_ascii_digit()));
+        if self.peek() == Some(b'(') && !is_parameter && !names.is_defined(name) {
             let arguments = self.arguments(names)?;
             return function(name, arguments);
         }

@@ -224,6 +224,6 @@ fn blocks_of_posts_keep_their_geometry() {
 
 #[test]
 fn remarks_in_parentheses_follow_words() {
-    let text = "N1 R1=5 (COUNT)\nN2 G0 X5 (START)\nN3 M0 (CHECK THE TOOL)\nN4 G1 X7 F600 (SLOW)\nN5 X8(LAST)\nN6 M30 (END)\n";
-    assert_eq!(x_ends(text), [5.0, 7.0, 8.0]);
+    let text = "N1 R1=5 (COUNT)\nN2 G0 X5 (START)\nN3 M0 (CHECK THE TOOL)\nN4 G1 X7 F600 (SLOW)\nN5 X8(LAST)\nN6 X=R1+4 (SUM)\nN7 X=R1 (AGAIN)\nN8 M30 (END)\n";
+    assert_eq!(x_ends(text), [5.0, 7.0, 8.0, 9.0, 5.0]);
 }
