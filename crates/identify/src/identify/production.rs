@@ -396,8 +396,8 @@ fn apply_loop(fit: &LoopFit, (before, uncertainty): (&AxisConfig, f64), found: &
         [(LoopParameter::Beta, DelayParameter::Beta), (LoopParameter::Gamma, DelayParameter::Gamma)]
     {
         if let Some(value) = of(parameter) {
-            // β and γ act at velocity cycles only.
-            let half = INTERVAL * value.error + 0.5 * seconds(fit.periods.velocity) + uncertainty;
+            // β and γ act at velocity cycles only: true and fitted value lie anywhere within the same cycle.
+            let half = INTERVAL * value.error + seconds(fit.periods.velocity) + uncertainty;
             found.delays.push(delay(which, value.value - half, value.value + half, fit));
         }
     }
