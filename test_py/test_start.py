@@ -94,7 +94,7 @@ def test_parameters_of_other_nodes_are_ignored(start: Callable[..., AxesClient],
             [],
         ),
     ],
-    ids=["empty", "two_sections", "bom_crlf", "nested_twice", "values_of_others", "clock", "patterns"],
+    ids=["empty", "empty_mapping", "two_sections", "bom_crlf", "nested_twice", "values_of_others", "clock", "patterns"],
 )
 def test_files_that_ros_reads_are_accepted(
     start: Callable[..., AxesClient], tmp_path: Path, text: str, gain: float, warnings: list[str]

@@ -125,7 +125,7 @@ impl ParameterLayout {
         let (topic, policy) = key.strip_prefix("qos_overrides.")?.split_once('.')?;
         let (topic, policy) = (topic.rsplit('/').next()?, policy.rsplit('.').next()?);
         let own = format!("qos.{topic}.{policy}");
-        self.definitions().any(|(known, _)| known.to_string() == own).then_some(own)
+        self.definitions().any(|(known, _)| known == own).then_some(own)
     }
 
     fn unknown(&self, key: &str, at: &ValueSource) -> ConfigError {

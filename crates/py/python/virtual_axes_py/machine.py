@@ -204,7 +204,7 @@ class Machine:
 
     def _loads(self, loads: Loads) -> NDArray[np.float64]:
         """Returns loads as rows of all axes, N or N·m."""
-        is_row = hasattr(loads, "dims") and np.ndim(loads) == 1
+        is_row = hasattr(loads, "dims") and getattr(loads, "ndim", 0) == 1
         if isinstance(loads, Mapping):
             is_row = not loads or not all(np.ndim(one) == 1 for one in loads.values())
         columns = None if is_row else axis_columns(self, "loads", loads)
