@@ -196,10 +196,13 @@ impl ProgramModel {
             .collect()
     }
 
-    /// Returns true if a motion follows that before it with nothing but comments between their lines.
+    /// Returns true if a motion follows that before it with nothing but comments and feeds between their lines.
     fn follows(&self, index: usize) -> bool {
         let [before, line] = [index - 1, index].map(|index| self.motions[index].0.line);
-        before < line && self.lines[before..line - 1].iter().all(|text| WordLine::is_comment(text))
+        before < line
+            && self.lines[before..line - 1]
+                .iter()
+                .all(|text| WordLine::is_comment(text) || WordLine::feed_alone(text).is_some())
     }
 
     fn add_chain(
@@ -361,6 +364,7 @@ impl ProgramModel {
         let mut feed = 0.0;
         for (line, text) in (1..).zip(&self.lines) {
             let (Some(range), Some(words)) = (self.by_line.get(&line), self.words.get(&line)) else {
+                feed = WordLine::feed_alone(text).unwrap_or(feed);
                 out.push(text.clone());
                 pieces.push(None);
                 sources.push(line);

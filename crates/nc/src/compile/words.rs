@@ -64,6 +64,16 @@ impl WordLine {
             || (text.starts_with('(') && text.find(')') == Some(text.len() - 1))
     }
 
+    /// Returns the F word of a line that changes the feed without a motion, such as `G1 F1800`.
+    pub fn feed_alone(text: &str) -> Option<f64> {
+        let line = Self::read(text)?;
+        let is_plain = |word: &Word| match word.letter {
+            'G' => line.text[word.number..word.end].parse() == Ok(1.0),
+            letter => "NF".contains(letter),
+        };
+        line.value('F').filter(|_| line.words.iter().all(is_plain))
+    }
+
     /// Returns true if the line has a word.
     pub fn has(&self, letter: char) -> bool {
         self.words.iter().any(|word| word.letter == letter)

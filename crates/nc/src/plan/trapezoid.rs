@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use virtual_axes_core::config::{ControlConfig, CornerRule};
+use virtual_axes_core::config::{ControlConfig, CornerRule, LimitsConfig};
 
 use super::activity::{ProgramActivity, ProgramStop, TimeKind};
 use super::corner::{CornerArc, cubic_corner};
@@ -41,9 +41,11 @@ struct Block {
     scale: f64,
     /// Length cut off by the corner at its start, m.
     cut: f64,
-    /// Limits of speed, m/s, and acceleration, m/s², along the path.
+    /// Limits of speed, with the feed, m/s, and acceleration, m/s², along the path.
     speed: f64,
     acceleration: f64,
+    /// Largest speed at its start with which the look-ahead counts, m/s.
+    entry_speed: f64,
     /// Jerk limit along the path, m/s³; infinite without one.
     jerk: f64,
     /// Speed limit of its curvature, m/s.
@@ -54,6 +56,8 @@ struct Block {
     is_overlapping: bool,
     /// True for lines of X, Y and Z and for arcs in a plane.
     is_simple: bool,
+    /// True if X, Y and Z alone move.
+    is_spatial: bool,
 }
 
 /// End of a segment.
@@ -76,6 +80,7 @@ struct Segment {
     /// Length, m.
     length: f64,
     speed: f64,
+    entry_speed: f64,
     acceleration: f64,
     jerk: f64,
     end: Junction,
@@ -186,7 +191,8 @@ impl TrapezoidPlanner {
         segments > self.control.look_ahead
     }
 
-    /// Returns the largest speed at the end of the first element from which a stop is possible.
+    /// Returns the largest speed at the end of the first element from which a stop is possible, within the feeds of this
+    /// element and the next one. Feeds behind them are not known ahead.
     fn exit_speed(&self) -> f64 {
         let mut known = 1;
         for element in self.elements.iter().take(self.control.look_ahead + 1) {
@@ -207,7 +213,10 @@ impl TrapezoidPlanner {
                 speed = 0.0;
                 continue;
             };
-            speed = segment.reachable(speed).min(segment.speed).min(before.speed).min(limit);
+            speed = segment.reachable(speed).min(segment.entry_speed).min(before.entry_speed).min(limit);
+            if index == 1 {
+                speed = speed.min(segment.speed).min(before.speed);
+            }
         }
         speed
     }
@@ -263,13 +272,14 @@ impl TrapezoidPlanner {
         if let Some(limit) = self.control.path_velocity.filter(|_| linear > 0.0) {
             speed = speed.min(limit / linear);
         }
+        let mut entry_speed = f64::INFINITY;
         let mut acceleration = f64::INFINITY;
         let mut jerk = f64::INFINITY;
         let mut bend_speed = f64::INFINITY;
         let is_simple = match &curve.shape {
             Shape::Line => {
                 for (bounds, &first) in model.joints.iter().zip(&first) {
-                    speed = speed.min(bounds.velocity / first.abs());
+                    entry_speed = entry_speed.min(bounds.velocity / first.abs());
                     acceleration = acceleration.min(bounds.acceleration / first.abs());
                     jerk = jerk.min(bounds.jerk / first.abs());
                 }
@@ -284,7 +294,7 @@ impl TrapezoidPlanner {
                     }
                 };
                 for (joint, bounds) in model.joints.iter().enumerate() {
-                    speed = speed.min(bounds.velocity / along(joint));
+                    entry_speed = entry_speed.min(bounds.velocity / along(joint));
                     acceleration = acceleration.min(bounds.acceleration / along(joint));
                     jerk = jerk.min(bounds.jerk / along(joint));
                 }
@@ -299,7 +309,8 @@ impl TrapezoidPlanner {
             Shape::Spline(_) => return Err(FeedPlanError::SplineUnsupported { line: curve.line }),
         };
         let scale = model.kinds.length(&first);
-        speed *= scale;
+        entry_speed *= scale;
+        speed = (speed * scale).min(entry_speed);
         bend_speed *= scale;
         acceleration *= scale;
         jerk = if self.control.is_jerk_limited { jerk * scale } else { f64::INFINITY };
@@ -307,14 +318,22 @@ impl TrapezoidPlanner {
             scale,
             cut: 0.0,
             speed,
+            entry_speed: if self.ignores_feeds_ahead() { entry_speed } else { speed },
             acceleration,
             jerk,
             bend_speed,
             has_kink: false,
             is_overlapping: false,
             is_simple,
+            is_spatial: (0..model.joints.len()).all(|joint| first[joint] == 0.0 || is_spatial(model, joint)),
             piece: Arc::new(piece),
         })
+    }
+
+    /// Returns true if the control looks ahead with the limits of the axes alone. Where a feed begins that is lower, the
+    /// motion before slows down as far as it can, and the new motion goes on with it.
+    fn ignores_feeds_ahead(&self) -> bool {
+        self.control.corners == CornerRule::Arc && !self.control.is_jerk_limited
     }
 
     /// Joins two motions: completes `before`, with a corner behind it, and keeps `next`.
@@ -327,8 +346,8 @@ impl TrapezoidPlanner {
         };
         let tangents = [unit(first.jet(first.length)), unit(second.jet(0.0))];
         let angle = angle_between(&tangents, model);
-        let is_straight =
-            angle < STRAIGHT || self.kink_speed(&before, &next, angle) > before.speed.max(next.speed);
+        let kink_speed = self.kink_speed([first, second], &tangents, model);
+        let is_straight = angle < STRAIGHT || kink_speed > before.speed.max(next.speed);
         match first.at_end {
             CurveEnd::Stop => {
                 self.push(&before, 0.0, Junction::Stop);
@@ -349,6 +368,17 @@ impl TrapezoidPlanner {
             CurveEnd::Blend(_) if is_rapid(first) != is_rapid(second) => {
                 self.push(&before, 0.0, Junction::Stop)
             }
+            // The start of the next motion within the end of this one allows about half of the lower speed.
+            CurveEnd::Blend(_)
+                if !(before.is_simple && next.is_simple)
+                    && before.is_spatial
+                    && next.is_spatial
+                    && self.control.corners == CornerRule::Arc
+                    && kink_speed > 0.5 * before.speed.min(next.speed) =>
+            {
+                (before.has_kink, next.has_kink) = (before.has_kink || !is_straight, !is_straight);
+                self.push(&before, 0.0, Junction::Through(kink_speed));
+            }
             CurveEnd::Blend([tolerance, rotary])
                 if !(before.is_simple && next.is_simple) && self.control.corners == CornerRule::Arc =>
             {
@@ -366,7 +396,10 @@ impl TrapezoidPlanner {
             }
             CurveEnd::Blend(_) if is_straight => self.push(&before, 0.0, Junction::Through(f64::INFINITY)),
             CurveEnd::Blend([tolerance, _]) => match self.control.corners {
-                CornerRule::Arc => self.corner(&before, &mut next, &tangents, [angle, tolerance], model),
+                CornerRule::Arc => {
+                    let corner = [angle, tolerance, kink_speed];
+                    self.corner(&mut before, &mut next, &tangents, corner, model);
+                }
                 CornerRule::Stop => self.push(&before, 0.0, Junction::Stop),
                 CornerRule::VelocityStep => {
                     let speed = self.control.corner_velocity / (2.0 * (0.5 * angle).sin());
@@ -391,28 +424,38 @@ impl TrapezoidPlanner {
         [normal, self.control.tangential_fraction * acceleration]
     }
 
-    /// Returns the speed at which a change of direction in one block cycle uses its part of the acceleration.
-    fn kink_speed(&self, before: &Block, next: &Block, angle: f64) -> f64 {
-        let acceleration = self.control.kink_fraction * before.acceleration.min(next.acceleration);
-        acceleration * self.control.block_cycle / (2.0 * (0.5 * angle).sin())
+    /// Returns the speed at which a change of direction in one block cycle uses its part of the acceleration of an axis.
+    fn kink_speed(
+        &self,
+        curves: [&MotionCurve; 2],
+        tangents: &[JointVector; 2],
+        model: &MachineModel,
+    ) -> f64 {
+        let change = |(joint, bounds): (usize, &LimitsConfig)| {
+            (tangents[1][joint] - tangents[0][joint]).abs() / bounds.acceleration
+        };
+        let largest = model.joints.iter().enumerate().map(change).fold(0.0, f64::max);
+        let has_arc = curves.iter().any(|curve| !curve.is_line());
+        let fraction = if has_arc { self.control.tangential_fraction } else { 1.0 };
+        fraction * self.control.kink_fraction * self.control.block_cycle / largest
     }
 
-    /// Completes `before` and appends a corner of `angle` within a tolerance; cuts off the start of `next`.
+    /// Completes `before` and appends a corner of `angle` within a tolerance; cuts off the start of `next`. A corner that
+    /// is passed faster without an arc remains.
     fn corner(
         &mut self,
-        before: &Block,
+        before: &mut Block,
         next: &mut Block,
         tangents: &[JointVector; 2],
-        [angle, tolerance]: [f64; 2],
+        [angle, tolerance, kink_speed]: [f64; 3],
         model: &MachineModel,
     ) {
         let [first, second] = [curve(&before.piece), curve(&next.piece)];
         let [normal, tangential] = self.corner_acceleration(tangents, model);
         let (sine, cosine) = (0.5 * angle).sin_cos();
-        let [before_length, next_length] = [before, &*next].map(|block| block.scale * block.piece.length);
+        let [before_length, next_length] = [&*before, &*next].map(|block| block.scale * block.piece.length);
         let most = 0.5 * before_length.min(next_length);
-        let [fastest, slowest] = [f64::max, f64::min]
-            .map(|f| f(before.speed.min(before.bend_speed), next.speed.min(next.bend_speed)));
+        let fastest = before.speed.min(before.bend_speed).max(next.speed.min(next.bend_speed));
         // Neither an arc as long as a stop and a start nor one that allows the feed need be longer.
         let radius = corner_radius(angle, tolerance)
             .min(most * cosine / sine)
@@ -424,7 +467,12 @@ impl TrapezoidPlanner {
             self.push(before, 0.0, Junction::Stop);
             return;
         }
-        let speed = slowest.min((normal * radius).sqrt());
+        let speed = fastest.min((normal * radius).sqrt());
+        if kink_speed > speed {
+            (before.has_kink, next.has_kink) = (true, true);
+            self.push(before, 0.0, Junction::Through(kink_speed));
+            return;
+        }
         self.push(before, cut, Junction::Through(speed));
         let start = first.point(first.length - cuts[0]);
         let curve = if first.is_line() && second.is_line() {
@@ -450,6 +498,7 @@ impl TrapezoidPlanner {
             from: 0.0,
             length: radius * angle,
             speed,
+            entry_speed: speed,
             acceleration: tangential,
             jerk: before.jerk.min(next.jerk),
             end: Junction::Through(f64::INFINITY),
@@ -473,8 +522,8 @@ impl TrapezoidPlanner {
         let length = block.scale * block.piece.length - block.cut - cut;
         let mut acceleration = self.acceleration(block);
         let bend_speed = block.bend_speed * self.kink_share(block).sqrt();
-        let mut speed =
-            block.speed.min(bend_speed).min(block.scale * block.piece.length / self.control.block_cycle);
+        let most = bend_speed.min(block.scale * block.piece.length / self.control.block_cycle);
+        let (mut speed, mut entry_speed) = (block.speed.min(most), block.entry_speed.min(most));
         // The rest of a line that is short at the speed of the corner becomes part of it.
         if let Junction::Through(corner) = end
             && cut > 0.0
@@ -482,7 +531,7 @@ impl TrapezoidPlanner {
             && length < self.control.gap_cycles * self.control.block_cycle * corner
         {
             acceleration *= self.control.tangential_fraction;
-            speed = speed.min(corner);
+            (speed, entry_speed) = (speed.min(corner), entry_speed.min(corner));
         }
         self.push_segment(Segment {
             piece: Arc::clone(&block.piece),
@@ -490,6 +539,7 @@ impl TrapezoidPlanner {
             from: block.cut / block.scale,
             length: length.max(0.0),
             speed,
+            entry_speed,
             acceleration,
             jerk: block.jerk,
             end,
@@ -505,7 +555,7 @@ impl TrapezoidPlanner {
 
     /// Appends the motion along a segment to the entries.
     fn execute(&mut self, segment: &Segment, exit: f64, entries: &mut VecDeque<PlannedInterval>) {
-        let exit = exit.min(segment.reachable(self.speed));
+        let exit = exit.min(segment.reachable(self.speed)).max(segment.slowed(self.speed));
         let phases = phases(segment, [self.speed, exit]);
         let total: f64 = phases.iter().map(|phase| phase.duration).sum();
         let tail = self.tail_duration(segment, &phases);
@@ -587,6 +637,11 @@ impl Segment {
         0.5 * (speeds[0] + speeds[1]) * (2.0 * jerk_time + constant)
     }
 
+    /// Returns the speed at the end of the segment after slowing down from another one all along it, m/s.
+    fn slowed(&self, speed: f64) -> f64 {
+        (speed * speed - 2.0 * self.acceleration * self.length).max(0.0).sqrt()
+    }
+
     /// Returns the speed that is reached from another one along the segment, m/s.
     fn reachable(&self, speed: f64) -> f64 {
         let most = (speed * speed + 2.0 * self.acceleration * self.length).sqrt();
@@ -628,7 +683,7 @@ fn phases(segment: &Segment, [start, end]: [f64; 2]) -> Vec<Phase> {
         return jerk_limited_phases(segment, [start, end]);
     }
     let reachable = (0.5 * (start * start + end * end) + a * length).sqrt();
-    let peak = speed.max(start).max(end).min(reachable);
+    let peak = speed.max(end).min(reachable);
     let mut phases = Vec::with_capacity(3);
     let mut at = 0.0;
     let mut push = |duration: f64, speed: f64, acceleration: f64| {
@@ -641,8 +696,9 @@ fn phases(segment: &Segment, [start, end]: [f64; 2]) -> Vec<Phase> {
         push(2.0 * length / (start + end), start, (end * end - start * start) / (2.0 * length));
         return phases;
     }
-    let ramps = (2.0 * peak * peak - start * start - end * end) / (2.0 * a);
-    push((peak - start) / a, start, a);
+    // The start can be faster than the feed.
+    let ramps = ((peak * peak - start * start).abs() + peak * peak - end * end) / (2.0 * a);
+    push((peak - start).abs() / a, start, a * (peak - start).signum());
     push((length - ramps).max(0.0) / peak, peak, 0.0);
     push((peak - end) / a, peak, -a);
     phases
