@@ -183,7 +183,7 @@ fn wrong_lines_are_rejected() {
             "part.nc:2: word X: DIA: the variable has no value: set it before it is used",
         ),
         ("$A.MIN%\nCALL OXY\n", "part.nc:2: Oxy: no such subprogram in this file"),
-        ("$A.MIN%\nVC1=#8G\n", "part.nc:2: #8g: a hexadecimal number is required, as in #81H"),
+        ("$A.MIN%\nVC1=#8G\n", "part.nc:2: #8G: a hexadecimal number is required, as in #81H"),
         (
             "$A.MIN%\nCALL OO88 PH=1 PC=90\n",
             "part.nc:2: CALL OO88 requires PP, the number of a work coordinate system, as in PP=1",

@@ -234,7 +234,7 @@ impl Sinumerik {
 fn require_axes(words: &Words, state: &State) -> Outcome<()> {
     for (axis, letter) in AXIS_LETTERS.into_iter().enumerate() {
         // A rotary axis that the machine lacks may stay at 0.
-        let moves = words.axes[axis].is_some_and(|(value, _)| axis < 3 || axis >= 6 || value != 0.0);
+        let moves = words.axes[axis].is_some_and(|(value, _)| !(3..6).contains(&axis) || value != 0.0);
         if moves && !state.options.axes[axis] {
             let known = AXIS_LETTERS.into_iter().zip(state.options.axes).filter(|(_, has)| *has);
             let known = known.map(|(letter, _)| letter.to_string()).collect::<Vec<_>>().join(" ");
