@@ -400,7 +400,7 @@ mod tests {
             ("X=SIN[A1]*2 G1", "x[sin[#<_v_a1>]*2]g1"),
             ("M143 VSLNO=1", "m143#<_v_vslno>=1"),
             ("VSLDT[1,30]", ""),
-            ("NCYLG81Z=ZP-2R3", "g81z[#<_v_zp>-2]r3l0"),
+            ("NCYLG81Z-2R3", "g81z-2r3l0"),
             ("G81 Z-2 R3 NCYL", "g81z-2r3l0"),
             ("IF [PX NE EMPTY] NXT1", "if[#<_v_px>ne#0]goto1000047658"),
             ("VFST=#81H", "#<_v_vfst>=129"),
