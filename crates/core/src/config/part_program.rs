@@ -22,7 +22,7 @@ parameters! {
         /// Dialect of part programs; without one it is detected from their content.
         pub dialect: Option<String> = choice(
             "part_program.dialect",
-            &["linuxcnc", "fanuc", "haas", "sinumerik", "grbl", "mach3", "okuma"],
+            &["linuxcnc", "fanuc", "haas", "sinumerik", "grbl", "mach3", "okuma", "marlin"],
         ).optional();
         /// Work offsets, each as in "G54=120,80,-350": X, Y and Z in mm, then A, B and C in degrees; those that are not
         /// given are the workpiece frame.

@@ -53,7 +53,7 @@ impl State {
         let letters = [CENTERS[first], CENTERS[second]];
         // grbl does not read the third word; posts write it as 0.
         let is_unused = |word: f64| match self.dialect {
-            Dialect::Grbl => true,
+            Dialect::Grbl | Dialect::Marlin => true,
             Dialect::LinuxCnc => false,
             _ => word == 0.0,
         };

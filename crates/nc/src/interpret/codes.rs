@@ -3,13 +3,15 @@
 //! Each group is an enum, so that the compiler points to the places where a new code must be executed. The same number
 //! may have another meaning in another dialect.
 
-use super::dialect::{ALL, Dialect, FANUC, GRBL, HAAS, LINUXCNC, MACH3, OKUMA};
+use super::dialect::{self, ALL, Dialect, FANUC, HAAS, LINUXCNC, MACH3, MARLIN, OKUMA};
 use super::error::Outcome;
 
 /// Dialects with codes of production controls.
 const FH: u8 = FANUC | HAAS;
 /// Dialects that share codes with these.
 const FHM: u8 = FH | MACH3;
+/// Firmware of small machines.
+const GRBL: u8 = dialect::GRBL | MARLIN;
 /// Dialects on the base of RS-274/NGC.
 const NGC: u8 = LINUXCNC | MACH3 | GRBL;
 /// Dialects except grbl.
@@ -281,6 +283,7 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
     (230, FH | OKUMA, ""),
     (250, FH, ""),
     (260, FH, "PQRI"),
+    (290, MARLIN, "ABDEFHIJKLPQRSTUVWXY"),
     (291, FH | NGC, ""),
     (350, HAAS, ""),
     (401, FH, ""),

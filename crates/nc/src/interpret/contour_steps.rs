@@ -99,7 +99,8 @@ impl State {
             self.steps.push_back(ProgramStep::Motion(motion));
             return Ok(());
         };
-        let ends_perpendicular = matches!(self.dialect, Dialect::LinuxCnc | Dialect::Mach3 | Dialect::Grbl);
+        let ends_perpendicular =
+            matches!(self.dialect, Dialect::LinuxCnc | Dialect::Mach3 | Dialect::Grbl | Dialect::Marlin);
         let new = || Compensator::new(compensation, plane, ends_perpendicular);
         let result = self.contour.compensator.get_or_insert_with(new).push(motion, &mut self.contour.out);
         self.steps.extend(self.contour.out.drain(..));

@@ -129,7 +129,11 @@ impl State {
     pub(super) fn set_control_variable(&mut self, number: usize, value: f64) -> Outcome<()> {
         let known = if value.is_nan() { 0.0 } else { value };
         match (number, quantity(number)) {
-            (3000, _) => return Err(format!("alarm of the program: #3000={known}")),
+            (3000, _) => {
+                // The control stops.
+                self.has_ended = true;
+                return Err(format!("alarm of the program: #3000={known}"));
+            }
             (3006, _) => self.push_event(ProgramEvent::Stop),
             (_, Some(Quantity::WorkOffset(system, axis))) => {
                 self.options.work_offsets[system][axis] = known * self.unit(axis);

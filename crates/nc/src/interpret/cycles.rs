@@ -179,16 +179,25 @@ impl State {
         let (letter, length, name) = (AXIS_LETTERS[drill], self.modal.length, g_name(cycle.code.number()));
         let is_incremental = self.modal.is_incremental;
         let is_linuxcnc = self.dialect == Dialect::LinuxCnc;
-        cycle.retract = block.take('R').map(|retract| retract * length).or(cycle.retract);
+        // Controls with macro B keep the levels of the line that has the words, also for lines with G91.
+        let keeps_levels = self.dialect.has_macro_b();
+        let word = block.take('R').map(|retract| retract * length);
         let base = if is_incremental { cycle.initial } else { 0.0 };
-        let retract = match cycle.retract {
-            Some(retract) => retract + base,
-            None if is_linuxcnc => return Err(format!("{name} requires R, the plane of retraction")),
-            None => cycle.initial,
+        let retract = match (word, cycle.retract) {
+            (None, Some(retract)) if keeps_levels => retract,
+            (Some(retract), _) | (None, Some(retract)) => retract + base,
+            (None, None) if is_linuxcnc => return Err(format!("{name} requires R, the plane of retraction")),
+            (None, None) => cycle.initial,
         };
-        cycle.bottom = block.take(letter).map(|bottom| bottom * length).or(cycle.bottom);
-        let bottom = cycle.bottom.ok_or_else(|| format!("{name} requires {letter}, the depth"))?;
-        let bottom = bottom + if is_incremental { retract } else { 0.0 };
+        cycle.retract = if keeps_levels { word.and(Some(retract)) } else { word }.or(cycle.retract);
+        let word = block.take(letter).map(|bottom| bottom * length);
+        let base = if is_incremental { retract } else { 0.0 };
+        let bottom = match (word, cycle.bottom) {
+            (None, Some(bottom)) if keeps_levels => bottom,
+            (Some(bottom), _) | (None, Some(bottom)) => bottom + base,
+            (None, None) => return Err(format!("{name} requires {letter}, the depth")),
+        };
+        cycle.bottom = if keeps_levels { word.and(Some(bottom)) } else { word }.or(cycle.bottom);
         if retract < bottom && !is_back_boring(cycle.code) {
             return Err(format!("{name}: the plane R is below the depth {letter}"));
         }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::io::{BufRead, Seek, SeekFrom};
+use std::path::Path;
 use std::str::FromStr;
 
 use virtual_axes_core::encoding::TextEncoding;
@@ -33,12 +34,22 @@ pub enum Dialect {
     Mach3,
     /// Okuma: milling programs of OSP controls.
     Okuma,
+    /// Marlin and other firmware of printers that mill: RepRapFirmware, Smoothieware.
+    Marlin,
 }
 
 impl Dialect {
     /// All dialects.
-    pub const ALL: [Self; 7] =
-        [Self::LinuxCnc, Self::Fanuc, Self::Haas, Self::Sinumerik, Self::Grbl, Self::Mach3, Self::Okuma];
+    pub const ALL: [Self; 8] = [
+        Self::LinuxCnc,
+        Self::Fanuc,
+        Self::Haas,
+        Self::Sinumerik,
+        Self::Grbl,
+        Self::Mach3,
+        Self::Okuma,
+        Self::Marlin,
+    ];
 
     /// Returns the name, as in `--dialect`.
     pub fn name(self) -> &'static str {
@@ -50,6 +61,7 @@ impl Dialect {
             Self::Grbl => "grbl",
             Self::Mach3 => "mach3",
             Self::Okuma => "okuma",
+            Self::Marlin => "marlin",
         }
     }
 
@@ -61,6 +73,21 @@ impl Dialect {
     /// Returns true for Fanuc and Haas, with macro B, and for Okuma, whose lines are translated to it.
     pub(super) fn has_macro_b(self) -> bool {
         matches!(self, Self::Fanuc | Self::Haas | Self::Okuma)
+    }
+
+    /// Returns true for firmware of small machines: grbl and Marlin.
+    pub(super) fn is_firmware(self) -> bool {
+        matches!(self, Self::Grbl | Self::Marlin)
+    }
+
+    /// Returns the dialect of files with an extension that only one control has.
+    fn of_extension(extension: &str) -> Option<Self> {
+        match extension.to_ascii_lowercase().as_str() {
+            "mpf" | "spf" => Some(Self::Sinumerik),
+            "min" | "ssb" => Some(Self::Okuma),
+            "eia" => Some(Self::Fanuc),
+            _ => None,
+        }
     }
 }
 
@@ -98,10 +125,16 @@ impl DetectedDialect {
         Some((*line, format!("dialect {}, detected from {text}; --dialect sets another", self.dialect)))
     }
 
-    /// Detects the dialect from the first MiB of a program, and returns to its start. A source that cannot be read has no
-    /// evidence.
-    pub fn of<R: BufRead + Seek>(source: &mut R) -> Self {
+    /// Detects the dialect from the first MiB of a program and the extension of its file `name`, and returns to its start.
+    /// A source that cannot be read has no evidence.
+    pub fn of<R: BufRead + Seek>(source: &mut R, name: &str) -> Self {
         let mut scores: [Score; Dialect::ALL.len()] = Default::default();
+        let extension = Path::new(name).extension().and_then(|extension| extension.to_str());
+        if let Some(extension) = extension
+            && let Some(dialect) = Dialect::of_extension(extension)
+        {
+            scores[dialect as usize].add(ENOUGH, &format!("the extension {extension}"), 1);
+        }
         let (mut bytes, mut line) = (0, Vec::new());
         let encoding = TextEncoding::of(source.fill_buf().unwrap_or_default());
         for number in 1.. {
@@ -185,6 +218,16 @@ struct Score {
     text: Option<(String, usize)>,
 }
 
+impl Score {
+    /// Adds the points of a text in a line.
+    fn add(&mut self, points: u32, text: &str, line: usize) {
+        self.points += points;
+        if points > self.strongest {
+            (self.strongest, self.text) = (points, Some((text.to_owned(), line)));
+        }
+    }
+}
+
 pub(super) const LINUXCNC: u8 = 1 << Dialect::LinuxCnc as u8;
 pub(super) const FANUC: u8 = 1 << Dialect::Fanuc as u8;
 pub(super) const HAAS: u8 = 1 << Dialect::Haas as u8;
@@ -192,6 +235,7 @@ const SINUMERIK: u8 = 1 << Dialect::Sinumerik as u8;
 pub(super) const GRBL: u8 = 1 << Dialect::Grbl as u8;
 pub(super) const MACH3: u8 = 1 << Dialect::Mach3 as u8;
 pub(super) const OKUMA: u8 = 1 << Dialect::Okuma as u8;
+pub(super) const MARLIN: u8 = 1 << Dialect::Marlin as u8;
 
 /// Bits of all dialects.
 pub(super) const ALL: u8 = u8::MAX;
@@ -245,6 +289,7 @@ const RULES: &[(u8, u32, Pattern)] = &[
     (LINUXCNC, 3, Code("G64P")),
     (LINUXCNC, 6, Comment("LINUXCNC")),
     (LINUXCNC, 6, Comment("EMC2")),
+    (LINUXCNC, 6, Comment("PATHPILOT")),
     (LINUXCNC | MACH3, 2, Word("G91.1")),
     (LINUXCNC | MACH3, 2, Word("G59.1")),
     (FANUC | HAAS, 3, ProgramNumber),
@@ -274,6 +319,9 @@ const RULES: &[(u8, u32, Pattern)] = &[
     (FANUC, 1, Word("G43.5")),
     (FANUC, 3, Word("G53.1")),
     (FANUC, 6, Comment("FANUC")),
+    (FANUC, 6, Comment("MAZAK")),
+    (FANUC, 6, Comment("BROTHER")),
+    (FANUC, 6, Comment("HURCO")),
     (HAAS, 6, Comment("HAAS")),
     (HAAS, 4, Word("G187")),
     (HAAS, 4, Word("G154")),
@@ -329,13 +377,24 @@ const RULES: &[(u8, u32, Pattern)] = &[
     (SINUMERIK, 6, Comment("SINUMERIK")),
     (SINUMERIK, 6, Comment("SIEMENS")),
     (GRBL, 6, Command),
-    (GRBL, 3, Code("M117")),
-    (GRBL, 3, HighAuxiliary),
-    (GRBL, 3, Homing),
     (GRBL, 6, Comment("GRBL")),
+    (GRBL, 6, Comment("FLUIDNC")),
+    (MARLIN, 6, Comment("MARLIN")),
+    (MARLIN, 6, Comment("REPRAP")),
+    (MARLIN, 6, Comment("SMOOTHIEWARE")),
+    (MARLIN, 3, Code("M117")),
+    (MARLIN, 3, HighAuxiliary),
+    (MARLIN, 3, Homing),
+    (MARLIN, 3, Code("G4S")),
+    (MARLIN, 3, Code("G04S")),
+    // With S: machine builders have M codes of these numbers.
+    (MARLIN, 3, Code("M104S")),
+    (MARLIN, 3, Code("M106S")),
+    (MARLIN, 3, Code("M140S")),
     (MACH3, 6, Comment("MACH3")),
     (MACH3, 6, Comment("MACH2")),
     (MACH3, 6, Comment("MACH4")),
+    (MACH3, 6, Comment("UCCNC")),
     (OKUMA, 12, Head),
     (OKUMA, 8, Pair("G15", 'H')),
     (OKUMA, 6, Pair("G16", 'H')),
@@ -347,7 +406,7 @@ const RULES: &[(u8, u32, Pattern)] = &[
     (OKUMA, 6, Code("NCYL")),
     (OKUMA, 6, Code("VTLCN")),
     (OKUMA, 6, Start("MODIN")),
-    (OKUMA, 6, Start("CALLO")),
+    (OKUMA, 12, Start("CALLO")),
     (OKUMA, 4, Start("RTS")),
     (OKUMA, 6, Comment("OKUMA")),
 ];
@@ -370,10 +429,7 @@ fn add_evidence(line: &str, number: usize, scores: &mut [Score; Dialect::ALL.len
                 continue;
             }
             score.rules |= 1 << index;
-            score.points += points;
-            if *points > score.strongest {
-                (score.strongest, score.text) = (*points, Some((text.to_owned(), number)));
-            }
+            score.add(*points, text, number);
         }
     }
 }
@@ -512,7 +568,7 @@ mod tests {
     use super::*;
 
     fn detected(text: &str) -> (&'static str, Option<usize>) {
-        let found = DetectedDialect::of(&mut std::io::Cursor::new(text));
+        let found = DetectedDialect::of(&mut std::io::Cursor::new(text), "part.nc");
         (found.dialect.name(), found.evidence.map(|(_, line)| line))
     }
 
@@ -530,13 +586,18 @@ mod tests {
             ("G43.4 H1\nG0 A40\nG4 P0.4\n", ("linuxcnc", None)),
             ("$H\nG21\nG0 X1\n", ("grbl", Some(1))),
             ("$I ; build\n$10=3\nG0 X1\n", ("grbl", Some(1))),
-            ("G21\nM2000;custom\nG0 X1\n", ("grbl", Some(2))),
+            ("G21\nM2000;custom\nG0 X1\n", ("marlin", Some(2))),
             ("G68 X0 Y0 R30\nG0 X1\n", ("fanuc", Some(1))),
             ("(post: Mach3)\nG68 A0 B0 R30\n", ("mach3", Some(1))),
-            ("M117 Pocket, holes\nG28 X Y\n", ("grbl", Some(1))),
-            ("% pocket\nG0 Z3\nG28 Z\n", ("grbl", Some(3))),
+            ("M117 Pocket, holes\nG28 X Y\n", ("marlin", Some(1))),
+            ("% pocket\nG0 Z3\nG28 Z\n", ("marlin", Some(3))),
             ("%\nO1\nG13 I0.25 F10.\n", ("haas", Some(2))),
             ("M428\nG0 X1\n", ("linuxcnc", None)),
+            ("G21\nM3 P100\nG4 S2\nG0 X1\n", ("marlin", Some(3))),
+            (";FLAVOR:Marlin\nG0 X1\n", ("marlin", Some(1))),
+            ("G21\nM106 S255\nG0 X1\n", ("marlin", Some(2))),
+            ("O1\nG0 X1.\nM106\nM107\nM84\nM201\n", ("fanuc", Some(1))),
+            ("CALL OBORE PX=1\nG0 X1\n", ("okuma", Some(1))),
             ("1 BEGIN PGM A MM\n2 FN 0: Q1=5\n", ("linuxcnc", None)),
             ("(post: grbl)\nG0 X1\n", ("grbl", Some(1))),
             ("(Mach3 mill)\nG0 X1\n", ("mach3", Some(1))),
@@ -554,12 +615,26 @@ mod tests {
     }
 
     #[test]
+    fn an_extension_is_evidence() {
+        for (name, text, expected) in [
+            ("PART.MPF", "G90 G0 X1\nM30\n", "sinumerik"),
+            ("/jobs/part.eia", "G90 G0 X1\nM30\n", "fanuc"),
+            ("PART.MIN", "G90 G0 X1\nM30\n", "okuma"),
+            ("part.eia", "(HAAS VF-2)\nG90 G0 X1\nM30\n", "haas"),
+            ("part.nc", "G90 G0 X1\nM30\n", "linuxcnc"),
+        ] {
+            let found = DetectedDialect::of(&mut std::io::Cursor::new(text), name);
+            assert_eq!(found.dialect.name(), expected, "{name}");
+        }
+    }
+
+    #[test]
     fn names_of_dialects_are_read_without_regard_to_case() {
         assert_eq!("Haas".parse(), Ok(Dialect::Haas));
         let error = "heidenhain".parse::<Dialect>().unwrap_err();
         assert_eq!(
             error,
-            "heidenhain: not a dialect; must be one of linuxcnc, fanuc, haas, sinumerik, grbl, mach3, okuma"
+            "heidenhain: not a dialect; must be one of linuxcnc, fanuc, haas, sinumerik, grbl, mach3, okuma, marlin"
         );
     }
 }

@@ -59,7 +59,7 @@ impl State {
         }
         self.set_coolant(&codes);
         self.dwell(block, &codes)?;
-        self.set_plane_and_units(&codes);
+        self.set_plane_and_units(block, &codes);
         self.set_distance_modes(&codes);
         if !codes.unsupported.is_empty() {
             block.skip(ALL_LETTERS);
@@ -145,7 +145,7 @@ impl State {
     /// Sets spindle and tool: S, T, M6, M61, M3, M4, M5, M13, M14, G96, G97.
     fn set_spindle_and_tool(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
         // S of a dwell is its time.
-        let is_dwell = self.dialect == Dialect::Grbl && codes.g.action == Some(Action::Dwell);
+        let is_dwell = self.dialect.is_firmware() && codes.g.action == Some(Action::Dwell);
         let mut speed = if is_dwell { None } else { block.take_rate('S')? };
         match codes.g.spindle_mode {
             Some(SpindleMode::SurfaceSpeed) => {
@@ -185,6 +185,10 @@ impl State {
                 SpindleWithCoolant::Counterclockwise => -1.0,
             }),
         };
+        if self.dialect == Dialect::Marlin && direction.is_some() {
+            // Power of a laser or spindle.
+            block.skip("IOP");
+        }
         self.modal.spindle_direction = direction.unwrap_or(self.modal.spindle_direction);
         if direction.is_some() || (speed.is_some() && self.modal.spindle_direction != 0.0) {
             self.push_spindle(1.0);
@@ -229,7 +233,7 @@ impl State {
 
     /// Returns the dwell of the words P, or X and U of other controls, s.
     pub(super) fn dwell_time(&mut self, block: &mut LineWords) -> Outcome<Option<f64>> {
-        let is_ngc = matches!(self.dialect, Dialect::LinuxCnc | Dialect::Grbl);
+        let is_ngc = self.dialect == Dialect::LinuxCnc || self.dialect.is_firmware();
         if codes_of_seconds(block) && !is_ngc {
             let time = block.take_rate('X')?;
             return Ok(time.or(block.take_rate('U')?));
@@ -239,9 +243,10 @@ impl State {
         {
             return Ok(Some(time));
         }
-        if self.dialect == Dialect::Grbl
+        if self.dialect.is_firmware()
             && let Some(time) = block.take_rate('S')?
         {
+            block.take('P');
             return Ok(Some(time));
         }
         let has_point = block.has_point('P');
@@ -250,6 +255,7 @@ impl State {
         };
         let is_ms = match self.dialect {
             Dialect::Fanuc | Dialect::Haas => !has_point,
+            Dialect::Marlin => true,
             _ => false,
         };
         if is_ms && !self.has_given_dialect {
@@ -268,7 +274,7 @@ impl State {
         Ok(Some(if is_ms { value * MILLISECOND } else { value }))
     }
 
-    fn set_plane_and_units(&mut self, codes: &Codes) {
+    fn set_plane_and_units(&mut self, block: &LineWords, codes: &Codes) {
         match codes.g.plane {
             Some(PlaneCode::Xy) => self.modal.plane = Plane::Xy,
             Some(PlaneCode::Zx) => self.modal.plane = Plane::Zx,
@@ -281,8 +287,17 @@ impl State {
                 self.modal.length = INCH;
             }
             Some(Units::Millimeter | Units::Millimeter71) => self.modal.length = MILLIMETER,
-            None => {}
+            None => {
+                // A parameter of these controls sets the units.
+                let is_set = self.has_units || !matches!(self.dialect, Dialect::Fanuc | Dialect::Haas);
+                let has_length = || "XYZ".chars().any(|axis| block.get(axis).is_some_and(|word| word != 0.0));
+                if is_set || !has_length() {
+                    return;
+                }
+                self.assume("lengths and feeds are in mm: no G20 or G21 stands before".to_owned());
+            }
         }
+        self.has_units = true;
     }
 
     /// Sets path control: G61, G61.1, G64.
@@ -369,6 +384,11 @@ impl State {
                 let level = block.take(AXIS_LETTERS[drill]).map(|level| level * self.modal.length);
                 self.modal.return_level.1 =
                     Some(level.ok_or("G71 requires the level of retraction, as in G71 Z50")?);
+            }
+            Some(Action::MachineCoordinates)
+                if self.dialect == Dialect::Fanuc && self.modal.is_incremental && block.has_axis() =>
+            {
+                self.assume("G53 has no effect with G91: the words are increments".to_owned());
             }
             Some(Action::MachineCoordinates) => is_machine = true,
             Some(Action::Data) => self.set_data(block)?,

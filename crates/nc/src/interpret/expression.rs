@@ -226,7 +226,12 @@ impl<'a> Scanner<'a> {
     fn parameter(&mut self) -> Outcome<f64> {
         match self.target()? {
             Target::Number(number) => self.state.numbered(number),
-            Target::Name(name) => self.state.named(name),
+            Target::Name(name) => {
+                // Okuma compares with EMPTY.
+                let may_be_empty = self.state.dialect == Dialect::Okuma
+                    && ["eq#0", "ne#0"].into_iter().any(|text| self.starts_with(text));
+                self.state.named(name).or_else(|error| if may_be_empty { Ok(f64::NAN) } else { Err(error) })
+            }
         }
     }
 

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::dialect::Dialect;
 use super::error::Outcome;
 use super::options::InterpreterOptions;
 
@@ -33,10 +34,13 @@ pub(super) fn is_permitted(path: &Path, options: &InterpreterOptions) -> bool {
 }
 
 fn find(options: &InterpreterOptions, label: &str) -> Option<PathBuf> {
+    // The O of a name is a letter of the file: OO30.SSB, OBORE.SSB.
+    let name = if options.dialect == Some(Dialect::Okuma) { &format!("o{label}") } else { label };
+    let is_of = |stem: &str| is_of(stem, label) || stem.eq_ignore_ascii_case(name);
     let entries = fs::read_dir(options.subprogram_folder.as_ref()?).ok()?.take(MAX_ENTRIES);
     let mut found: Vec<_> = entries
         .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| path.file_stem().and_then(|stem| stem.to_str()).is_some_and(|stem| is_of(stem, label)))
+        .filter(|path| path.file_stem().and_then(|stem| stem.to_str()).is_some_and(is_of))
         .filter(|path| is_permitted(path, options))
         .collect();
     found.sort();

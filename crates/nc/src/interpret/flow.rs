@@ -429,7 +429,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
     }
 
     /// Returns the first line of a subprogram. The first call reads the whole file once.
-    fn subprogram(&mut self, label: &str) -> Outcome<Place> {
+    pub(super) fn subprogram(&mut self, label: &str) -> Outcome<Place> {
         if self.flow.subprograms.is_none() {
             let found = self.find_subprograms(Place::START)?;
             self.flow.subprograms = Some(found);

@@ -151,7 +151,10 @@ impl LineWords {
             b'o' => return Err(format!("{word}: an O-word stands at the start of the line")),
             // Analog outputs of LinuxCNC have the word E.
             b'e' if !state.dialect.has_macro_b() && !self.m.iter().any(|code| matches!(code, 66..=68)) => {
-                return Err(format!("{word}: the letter E is not supported; numbers have no exponent"));
+                return Err(format!(
+                    "{word}: the letter E is not supported, the extruder of a printer or the work offset of Fadal \
+                     format 1; numbers have no exponent"
+                ));
             }
             _ => {
                 let bit = 1 << index(letter);

@@ -13,6 +13,8 @@ use super::parameters::integer;
 use super::source::Place;
 use super::state::Jump;
 
+/// Program of Okuma controls that computes the work offset of a turned workpiece: CALL OO88.
+const FIXTURE_OFFSET: &str = "o88";
 /// Statements without effect in a simulation.
 const WITHOUT_EFFECT: [&str; 5] = ["popen", "pclos", "dprnt", "bprnt", "setvn"];
 
@@ -62,6 +64,9 @@ impl<R: BufRead + Seek> Interpreter<R> {
         match statement {
             NamedStatement::Call(program, from) => {
                 let times = self.read_arguments(from)?;
+                if program == FIXTURE_OFFSET && self.subprogram(&program).is_err() {
+                    return self.state.set_fixture_offset();
+                }
                 if times > 0 {
                     self.call(&program, None, times)?;
                 }

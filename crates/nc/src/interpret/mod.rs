@@ -90,7 +90,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
         let foreign = SourceHead::of(&mut source).foreign;
         let dialect = match options.dialect {
             Some(dialect) => DetectedDialect { dialect, evidence: None },
-            None => DetectedDialect::of(&mut source),
+            None => DetectedDialect::of(&mut source, name),
         };
         let has_given_dialect = options.dialect.replace(dialect.dialect).is_some();
         let mut state = State::new(options);
@@ -168,7 +168,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
             if self.execute_statement(place)? {
                 return Ok(());
             }
-        } else if self.state.dialect == Dialect::Grbl && self.execute_command() {
+        } else if self.state.dialect.is_firmware() && self.execute_command() {
             return Ok(());
         }
         if is_o_word(&self.line.text) && !self.state.dialect.has_macro_b() {

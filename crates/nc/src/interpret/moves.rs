@@ -58,11 +58,12 @@ impl State {
             return Ok(());
         }
         match code {
-            Motion::Rapid => {
+            // G0 of Marlin moves at the feed.
+            Motion::Rapid if self.dialect != Dialect::Marlin || self.modal.feed.is_none() => {
                 let end = self.targets(block)?;
                 self.rapid_to(&end)
             }
-            Motion::Line => {
+            Motion::Rapid | Motion::Line => {
                 let end = self.targets(block)?;
                 self.line_to(&end)
             }
@@ -150,6 +151,7 @@ impl State {
         }
         match code {
             Motion::Line => self.push_feed(MotionKind::Line, end)?,
+            Motion::Skip => self.probe_to(block, code, |state| state.push_feed(MotionKind::Line, end))?,
             _ => self.push_rapid(end)?,
         }
         tcp_length.map_or(Ok(()), |length| self.enter_tcp(length))
@@ -157,11 +159,21 @@ impl State {
 
     /// Executes a probing motion: a straight line to its end, where nothing is touched.
     fn probe(&mut self, block: &mut LineWords, code: Motion) -> Outcome<()> {
+        let end = self.targets(block)?;
+        self.probe_to(block, code, |state| state.line_to(&end))
+    }
+
+    /// Executes the line `motion` of a probing motion.
+    fn probe_to(
+        &mut self,
+        block: &mut LineWords,
+        code: Motion,
+        motion: impl FnOnce(&mut Self) -> Outcome<()>,
+    ) -> Outcome<()> {
         block.skip("PQ");
         let name = g_name(code.number());
         self.assume(format!("{name}: a straight line to its end, nothing is touched"));
-        let end = self.targets(block)?;
-        self.line_to(&end)?;
+        motion(self)?;
         // The position of the touch.
         for axis in 0..AXIS_COUNT {
             self.parameters.set_of_control(5061 + axis, self.coordinate(axis))?;

@@ -8,6 +8,8 @@ use super::dialect::Dialect;
 use super::error::Outcome;
 use super::limits::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
 use super::line_words::LineWords;
+use super::okuma::PREFIX;
+use super::parameters::integer;
 use super::state::State;
 use super::work_offset::system_name;
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS};
@@ -59,6 +61,33 @@ impl State {
             self.offsets.active = index;
             self.note_missing_offset();
         }
+        Ok(())
+    }
+
+    /// Sets the work offset PP of Okuma to that of the point PX, PY, PZ of the work coordinate system PH, with the rotary
+    /// axes at PA, PB, PC.
+    pub(super) fn set_fixture_offset(&mut self) -> Outcome<()> {
+        let argument =
+            |name: &str| self.parameters.named(&format!("{PREFIX}p{name}")).filter(|value| !value.is_nan());
+        let system = |name: &str| {
+            let number = argument(name).and_then(integer).map(|number| number as usize);
+            let index = number.and_then(|number| number.checked_sub(1));
+            index.filter(|index| *index < self.options.work_offsets.len()).ok_or_else(|| {
+                let name = name.to_uppercase();
+                format!("CALL OO88 requires P{name}, the number of a work coordinate system, as in P{name}=1")
+            })
+        };
+        let (from, to) = (system("h")?, system("p")?);
+        let mut position = self.options.work_offsets[from];
+        for (axis, name) in ["x", "y", "z", "a", "b", "c"].into_iter().enumerate() {
+            position[axis] += argument(name).unwrap_or(0.0) * self.unit(axis);
+        }
+        let transform = self.options.kinematics.as_ref();
+        let transform = transform.ok_or("CALL OO88 requires a machine with kinematics")?;
+        let turned = transform.positions(&position, Some(0.0));
+        let mut offset = self.options.work_offsets[from];
+        offset[..3].copy_from_slice(&turned[..3]);
+        self.options.work_offsets[to] = offset;
         Ok(())
     }
 

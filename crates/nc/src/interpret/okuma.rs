@@ -71,16 +71,20 @@ pub(super) fn translate(line: &mut Vec<u8>) -> Outcome<Option<u32>> {
     let mut text = source.trim_ascii();
     let mut number = None;
     let first = token(text);
-    if first.first() == Some(&b'n') && !matches!(first, b"ncyl" | b"noex" | b"nomsg") {
+    let is_word = [&b"ncyl"[..], b"noex", b"nomsg"].iter().any(|word| first.starts_with(word));
+    if first.first() == Some(&b'n') && !is_word {
         let digits = first[1..].iter().take_while(|byte| byte.is_ascii_digit()).count();
         let end = if digits > 0 { digits + 1 } else { first.len() };
         number = Some(line_number(&first[1..end])?);
         text = text[end..].trim_ascii_start();
     }
-    let is_cycle_off = token(text) == b"ncyl";
-    if is_cycle_off || token(text) == b"noex" {
-        text = text[4..].trim_ascii_start();
+    let cycle_off = text.windows(4).position(|word| word == b"ncyl");
+    let without;
+    if let Some(at) = cycle_off {
+        without = [&text[..at], &text[at + 4..]].concat();
+        text = without.trim_ascii();
     }
+    text = text.strip_prefix(b"noex").unwrap_or(text).trim_ascii_start();
     let first = token(text);
     let rest = text[first.len()..].trim_ascii_start();
     match first {
@@ -100,7 +104,7 @@ pub(super) fn translate(line: &mut Vec<u8>) -> Outcome<Option<u32>> {
         _ if text.starts_with(b"goto") => jump(&text[4..], line)?,
         _ => words(text, line)?,
     }
-    if is_cycle_off && !line.is_empty() {
+    if cycle_off.is_some() && !line.is_empty() {
         // The cycle takes effect with the next line.
         line.extend_from_slice(b"l0");
     }
@@ -231,6 +235,12 @@ fn setting(text: &[u8], at: &mut usize, out: &mut Vec<u8>) -> Outcome<()> {
         *at += 1;
     }
     *at += 1;
+    if follows(text, *at, b'\'') {
+        // A text for the operator.
+        *at = text.len();
+        out.truncate(length);
+        return Ok(());
+    }
     out.push(b'=');
     expression(text, at, out, 0)
 }
@@ -269,12 +279,26 @@ fn expression(text: &[u8], at: &mut usize, out: &mut Vec<u8>, depth: usize) -> O
             b'[' => bracket(text, at, out, depth)?,
             b']' => return Ok(()),
             b'a'..=b'z' => operand(text, at, out, depth)?,
+            b'#' => hexadecimal(text, at, out)?,
             _ => {
                 out.push(byte);
                 *at += 1;
             }
         }
     }
+    Ok(())
+}
+
+/// Translates a hexadecimal number: `#81H`.
+fn hexadecimal(text: &[u8], at: &mut usize, out: &mut Vec<u8>) -> Outcome<()> {
+    let length = text[*at + 1..].iter().take_while(|byte| byte.is_ascii_alphanumeric()).count();
+    let number = &text[*at..*at + 1 + length];
+    let digits = str::from_utf8(&number[1..]).ok().and_then(|digits| digits.strip_suffix('h'));
+    let value = digits.and_then(|digits| u32::from_str_radix(digits, 16).ok());
+    let value =
+        value.ok_or_else(|| format!("{}: a hexadecimal number is required, as in #81H", shown(number)))?;
+    out.extend_from_slice(value.to_string().as_bytes());
+    *at += number.len();
     Ok(())
 }
 
@@ -319,8 +343,8 @@ fn variable(text: &[u8], at: &mut usize, out: &mut Vec<u8>, depth: usize) -> Out
         out.extend_from_slice(format!("#{}", COMMON + number.min(WORK_OFFSETS - COMMON - 1)).as_bytes());
         return Ok(());
     }
-    if name == b"vtlcn" {
-        out.extend_from_slice(b"#4120");
+    if name == b"vtlcn" || name == b"empty" {
+        out.extend_from_slice(if name == b"empty" { b"#0" } else { b"#4120" });
         return Ok(());
     }
     if text.get(*at) == Some(&b'[') {
@@ -376,6 +400,11 @@ mod tests {
             ("X=SIN[A1]*2 G1", "x[sin[#<_v_a1>]*2]g1"),
             ("M143 VSLNO=1", "m143#<_v_vslno>=1"),
             ("VSLDT[1,30]", ""),
+            ("NCYLG81Z-2R3", "g81z-2r3l0"),
+            ("G81 Z-2 R3 NCYL", "g81z-2r3l0"),
+            ("IF [PX NE EMPTY] NXT1", "if[#<_v_px>ne#0]goto1000047658"),
+            ("VFST=#81H", "#<_v_vfst>=129"),
+            ("VUACM[1]='NO DATA \"PX\"'", ""),
             ("OSTRT", "ostrt"),
         ] {
             assert_eq!(translated(text).0, expected, "{text}");

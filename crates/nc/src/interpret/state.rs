@@ -34,6 +34,8 @@ pub(super) struct State {
     pub dialect: Dialect,
     /// True if the options name the dialect, false if it was detected.
     pub has_given_dialect: bool,
+    /// True if the program has set the units, or a note says that it did not.
+    pub has_units: bool,
     /// Programmable frame: scaling, mirroring, rotation.
     pub frame: CoordinateFrame,
     /// Tilted plane (G68.2) in the work coordinate system, which the table angles of each position place.
@@ -154,9 +156,9 @@ pub(super) struct Cycle {
     pub code: Motion,
     /// Programmed coordinate of the drilling axis before the first line of the cycle, m.
     pub initial: f64,
-    /// Word R, m.
+    /// Word R, m; of macro B its programmed coordinate.
     pub retract: Option<f64>,
-    /// Word of the depth, m.
+    /// Word of the depth, m; of macro B its programmed coordinate.
     pub bottom: Option<f64>,
     /// Dwell P, s.
     pub dwell: Option<f64>,
@@ -219,6 +221,7 @@ impl State {
             },
             dialect: options.dialect.unwrap_or_default(),
             has_given_dialect: false,
+            has_units: false,
             frame: CoordinateFrame::identity(),
             tilt: None,
             modal,

@@ -1,7 +1,7 @@
 //! Programs in the manner of Fanuc and Haas: their motions follow from closed forms.
 
 use virtual_axes_core::config::{MachineConfig, Parameters};
-use virtual_axes_nc::interpret::{Dialect, InterpreterOptions, TipTransform, Tool};
+use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions, TipTransform, Tool};
 use virtual_axes_nc::motion::{Feed, MotionKind, ProgramEvent, ProgramMotion};
 
 use crate::common::{events, millimeters, motions, steps};
@@ -273,6 +273,63 @@ fn boring_and_tapping_cycles_follow_their_sequences() {
         [5.0, 0.0, 10.0],
     ];
     assert_ends(Dialect::Fanuc, text, &expected);
+}
+
+/// R-5. and Z-20. are levels of the line with G90, and R-3. and Z-4. of the one with G91 count from Z-5 and from R.
+#[test]
+fn lines_with_g91_keep_the_levels_of_a_canned_cycle() {
+    let hole = |x: f64, above: f64, retract: f64, bottom: f64| {
+        [[x, 0.0, above], [x, 0.0, retract], [x, 0.0, bottom], [x, 0.0, retract]]
+    };
+    for (dialect, times) in [(Dialect::Fanuc, "K2"), (Dialect::Haas, "L2")] {
+        let text = format!(
+            "O1\nG21 G90 G0 Z10.\nG99 G81 X5. Y0 Z-20. R-5. F100.\nG91 X10. {times}\nG80\n\
+             G99 G81 X10. Z-4. R-3.\nX10.\nG90 X50.\nM30\n"
+        );
+        let mut expected = vec![[0.0, 0.0, 10.0]];
+        expected.extend(hole(5.0, 10.0, -5.0, -20.0));
+        for x in [15.0, 25.0] {
+            expected.extend([[x, 0.0, -5.0], [x, 0.0, -20.0], [x, 0.0, -5.0]]);
+        }
+        expected.extend(hole(35.0, -5.0, -8.0, -12.0));
+        for x in [45.0, 50.0] {
+            expected.extend([[x, 0.0, -8.0], [x, 0.0, -12.0], [x, 0.0, -8.0]]);
+        }
+        assert_ends(dialect, &text, &expected);
+    }
+}
+
+#[test]
+fn g53_of_fanuc_has_no_effect_with_g91_and_may_probe() {
+    assert_ends(
+        Dialect::Fanuc,
+        "O1\nG21 G90 G0 X10.\nG91 G53 X5.\nG90 G53 X2.\nM30\n",
+        &[[10.0, 0.0, 0.0], [15.0, 0.0, 0.0], [2.0, 0.0, 0.0]],
+    );
+    let mut options = options(Dialect::Fanuc);
+    options.work_offsets[0][2] = 0.003;
+    let found = motions("O1\nG21 G90 G0 Z0\nG53 G31 Z-5. F120. P2\nG1 Z#5063\nM30\n", options);
+    let [_, probe] = &found[..] else { panic!("{found:?}") };
+    assert_eq!(millimeters(&probe.end), [0.0, 0.0, -5.0]);
+    assert!(matches!(probe.feed, Feed::Linear(feed) if (feed - 0.002).abs() < 1e-12), "{:?}", probe.feed);
+}
+
+#[test]
+fn an_alarm_ends_the_program_and_missing_units_are_noted() {
+    let report = |text: &str| {
+        let options = InterpreterOptions { reports_all_errors: true, ..options(Dialect::Fanuc) };
+        let mut interpreter = Interpreter::new(std::io::Cursor::new(text.to_owned()), "part.nc", options);
+        assert!(interpreter.by_ref().all(|step| step.is_ok()));
+        interpreter.report().clone()
+    };
+    let found = report("O1\nIF[#1EQ#0]THEN#3000=1(NO A)\nG0 X#1 Q7\nM30\n");
+    assert_eq!(found.errors.keys().collect::<Vec<_>>(), ["alarm of the program: #3000=1"]);
+    let note = "lengths and feeds are in mm: no G20 or G21 stands before";
+    for (line, first) in [("G0 Z0\nX1. F10.", Some(3)), ("G21\nX1.", None), ("G20\nX1.", None)] {
+        let found = report(&format!("O1\n{line}\nX2.\nM30\n"));
+        let note = found.assumptions.get(note);
+        assert_eq!(note.map(|note| (note.first_line, note.count)), first.map(|line| (line, 1)), "{line}");
+    }
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Programs in the manner of grbl and Mach3, comments and other texts of each control, and their detection.
 
 use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions};
-use virtual_axes_nc::motion::{MotionKind, ProgramEvent, ProgramStep};
+use virtual_axes_nc::motion::{Feed, MotionKind, ProgramEvent, ProgramStep};
 
 use crate::common::{events, millimeters, motions};
 
@@ -16,7 +16,7 @@ fn detected(text: &str) -> (Dialect, Vec<[f64; 3]>) {
 
 #[test]
 fn programs_run_in_their_detected_dialects() {
-    use Dialect::{Fanuc, Grbl, Haas, LinuxCnc, Mach3};
+    use Dialect::{Fanuc, Grbl, Haas, LinuxCnc, Mach3, Marlin};
     for (dialect, text, last) in [
         // Laser of a hobby machine.
         (
@@ -28,6 +28,11 @@ fn programs_run_in_their_detected_dialects() {
             Grbl,
             "(post: grbl)\nG17 G21 G90 G94 G54\nT1\nM3 S12000\nG0 Z5\nG1 Z-1 F200\nG2 X4 Y0 I2 J0 F600\nM30\n",
             [4.0, 0.0, -1.0],
+        ),
+        (
+            Marlin,
+            ";FLAVOR:Marlin\nG21\nG90\nG28\nG29\nM106 S255\nG0 X5 F3000\nM3 P100\nG1 X7 Y1 F600\nM107\nM84\n",
+            [7.0, 1.0, 0.0],
         ),
         (
             Mach3,
@@ -66,7 +71,7 @@ fn lines_of_firmware_are_texts_and_commands() {
     let text = "% post\nG21 G90\nM84 S0\n% vfd enable\nG0 X1\n%( start )\nM117 2D Pocket, X5\nM0 Put tool 1\nG0 X2\nM400\n?\nG28 Z\n\
                 G0 X3 Y1\n%\nG0 X99\n";
     let (found, ends) = detected(text);
-    assert_eq!(found, Dialect::Grbl);
+    assert_eq!(found, Dialect::Marlin);
     assert_eq!(ends.iter().map(|end| end[0]).collect::<Vec<_>>(), [1.0, 2.0, 3.0]);
     let texts = events(text, InterpreterOptions::default());
     let texts: Vec<_> = texts
@@ -149,12 +154,32 @@ fn the_center_word_across_the_plane_is_unused() {
     assert!(run(&arc.replace("K0.000", "K2"), Dialect::Fanuc).expect_err("rejected").contains("word K"));
 }
 
+/// grbl has P in s; Marlin P in ms and S in s, which comes first.
 #[test]
-fn a_dwell_of_firmware_has_its_time_by_s() {
-    let options = || InterpreterOptions { dialect: Some(Dialect::Grbl), ..InterpreterOptions::default() };
-    let dwells: Vec<f64> = events("G21 G90\nM3 S500\nG4 S1.5\nG4 P2\nG1 X1 F100\nM2\n", options())
-        .into_iter()
-        .filter_map(|(_, event)| if let ProgramEvent::Dwell(time) = event { Some(time) } else { None })
-        .collect();
-    assert_eq!(dwells, [1.5, 2.0]);
+fn a_dwell_of_firmware_has_its_time_by_s_or_p() {
+    for (dialect, expected) in [(Dialect::Grbl, [1.5, 2.0, 3.0]), (Dialect::Marlin, [1.5, 0.002, 3.0])] {
+        let options = InterpreterOptions { dialect: Some(dialect), ..InterpreterOptions::default() };
+        let dwells: Vec<f64> =
+            events("G21 G90\nM3 S500\nG4 S1.5\nG4 P2\nG4 P900 S3\nG1 X1 F100\nM2\n", options)
+                .into_iter()
+                .filter_map(
+                    |(_, event)| if let ProgramEvent::Dwell(time) = event { Some(time) } else { None },
+                )
+                .collect();
+        assert_eq!(dwells, expected, "{dialect}");
+    }
+}
+
+#[test]
+fn g0_of_marlin_moves_at_the_feed() {
+    let feeds = |dialect| {
+        let options = InterpreterOptions { dialect: Some(dialect), ..InterpreterOptions::default() };
+        let motions = motions("G0 X1\nG0 X2 F3000\nG1 X3 F600\nG0 X4\n", options);
+        motions.into_iter().map(|motion| motion.feed).collect::<Vec<_>>()
+    };
+    let [first, second, _, last] = feeds(Dialect::Marlin)[..] else { panic!("four motions") };
+    assert!(matches!(first, Feed::Rapid), "{first:?}");
+    assert!(matches!(second, Feed::Linear(feed) if (feed - 0.05).abs() < 1e-12), "{second:?}");
+    assert!(matches!(last, Feed::Linear(feed) if (feed - 0.01).abs() < 1e-12), "{last:?}");
+    assert!(matches!(feeds(Dialect::Grbl)[3], Feed::Rapid));
 }

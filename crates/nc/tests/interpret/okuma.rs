@@ -1,6 +1,7 @@
 //! Programs in the manner of Okuma posts and shops: their motions follow from hand-worked geometry.
 
-use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions, Tool};
+use virtual_axes_core::config::Parameters;
+use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions, TipTransform, Tool};
 use virtual_axes_nc::motion::ProgramEvent;
 
 use crate::common::{events, millimeters, motions, steps};
@@ -60,18 +61,22 @@ fn a_program_of_a_post_drills_with_work_offset_tool_length_and_return_level() {
 
 #[test]
 fn ncyl_positions_and_stores_the_cycle() {
-    let text = "$PLATE.MIN%\nG90 G0 Z10\nNCYL G81 X5 Y5 Z-3 R1 F100 M54\nX8\nG80\nM2\n";
-    assert_ends(
-        text,
-        &[
-            [0.0, 0.0, 10.0],
-            [105.0, 55.0, 10.0],
-            [108.0, 55.0, 10.0],
-            [108.0, 55.0, 1.0],
-            [108.0, 55.0, -3.0],
-            [108.0, 55.0, 1.0],
-        ],
-    );
+    for line in
+        ["NCYL G81 X5 Y5 Z-3 R1 F100 M54", "N2 G81 X5 Y5 Z-3 R1 F100 M54 NCYL", "NCYLG81X5Y5Z-3R1F100M54"]
+    {
+        let text = format!("$PLATE.MIN%\nG90 G0 Z10\n{line}\nX8\nG80\nM2\n");
+        assert_ends(
+            &text,
+            &[
+                [0.0, 0.0, 10.0],
+                [105.0, 55.0, 10.0],
+                [108.0, 55.0, 10.0],
+                [108.0, 55.0, 1.0],
+                [108.0, 55.0, -3.0],
+                [108.0, 55.0, 1.0],
+            ],
+        );
+    }
 }
 
 #[test]
@@ -80,6 +85,34 @@ fn variables_conditions_and_named_lines_make_a_loop() {
     let text = "$LOOP.MIN%\nVC1=0\nXPOS=2\nNLOOP VC1=VC1+1\nG0 X=XPOS+VC1*4\nIF [VC1 LT 3] NLOOP\n\
                 Y=SQRT[81] Z=VC[VC1-2]\nGOTO NEND\nG0 X99\nNEND M2\n";
     assert_ends(text, &[[106.0, 0.0, 0.0], [110.0, 0.0, 0.0], [114.0, 0.0, 0.0], [114.0, 59.0, 3.0]]);
+}
+
+#[test]
+fn variables_without_value_are_empty_and_texts_have_no_effect() {
+    let text = "$A.MIN%\nCALL OPOS PX=3\nM2\nOPOS\nIF [PY NE EMPTY] NSET\nPY=#1FH\nVUACM[1]='NO \"PY\"'\n\
+                NSET IF [PX EQ EMPTY] NEND\nG0 X=PX Y=PY\nNEND RTS\n";
+    assert_ends(text, &[[103.0, 81.0, 0.0]]);
+}
+
+/// A is 90°: the tool axis is −Y of the workpiece. The point X10 of G15 H1 is the zero of G15 H2.
+#[test]
+fn a_fixture_offset_turns_the_zero_with_the_tables() {
+    let machine = Parameters::embedded_default().expect("the default").machine_config().expect("a machine");
+    let transform = TipTransform::new(&machine);
+    let text =
+        "$A.MIN%\nG15 H1\nCALL OO88 PX=10 PA=90 PC=0 PH=1 PP=2\nG0 A90 C0\nG15 H2\nG0 X0 Y0 Z0\nZ5\nM2\n";
+    let options =
+        InterpreterOptions { dialect: Some(Dialect::Okuma), ..InterpreterOptions::for_machine(&machine) };
+    let found = motions(text, options);
+    let [_, zero, above] = &found[..] else { panic!("{} motions", found.len()) };
+    let workpiece = machine.kinematics().workpiece;
+    for (motion, expected) in [(zero, [10.0, 0.0, 0.0]), (above, [10.0, -5.0, 0.0])] {
+        let tip = millimeters(&transform.tip_of(&motion.end, 0.0));
+        for axis in 0..3 {
+            let expected = expected[axis] + 1e3 * workpiece[axis];
+            assert!((tip[axis] - expected).abs() < 1e-9, "{tip:?}, expected {expected} of axis {axis}");
+        }
+    }
 }
 
 #[test]
@@ -150,6 +183,11 @@ fn wrong_lines_are_rejected() {
             "part.nc:2: word X: DIA: the variable has no value: set it before it is used",
         ),
         ("$A.MIN%\nCALL OXY\n", "part.nc:2: Oxy: no such subprogram in this file"),
+        ("$A.MIN%\nVC1=#8G\n", "part.nc:2: #8G: a hexadecimal number is required, as in #81H"),
+        (
+            "$A.MIN%\nCALL OO88 PH=1 PC=90\n",
+            "part.nc:2: CALL OO88 requires PP, the number of a work coordinate system, as in PP=1",
+        ),
         ("$A.MIN%\nG15\n", "part.nc:2: G15 and G16 require H, the work coordinate system 0 to"),
         ("$A.MIN%\nIF VC1 N10\n", "part.nc:2: VC1 N10: IF requires a condition in brackets and a line"),
         ("$A.MIN%\nG0 X=[VC1\n", "part.nc:2: expression without closing bracket"),

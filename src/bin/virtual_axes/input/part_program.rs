@@ -28,7 +28,7 @@ pub struct PartProgramArguments {
     /// Feed override of a part program, 0 to 200 %: constant, or from times on, as in `0:100,2.5:0,4:120`.
     #[arg(long = "override", value_name = "PERCENT|S:PERCENT,…", allow_hyphen_values = true)]
     feed_override: Option<String>,
-    /// Dialect of a part program: linuxcnc, fanuc, haas, sinumerik, grbl, mach3 or okuma [default: of the machine file, or detected from the content].
+    /// Dialect of a part program: linuxcnc, fanuc, haas, sinumerik, grbl, mach3, okuma or marlin [default: of the machine file, or detected from the content].
     #[arg(long, value_name = "DIALECT")]
     dialect: Option<Dialect>,
     /// Work offset of a part program in place of that of the machine file, as in G54=120,80,-350: X, Y and Z in mm, then A, B and C in degrees. Repeatable.

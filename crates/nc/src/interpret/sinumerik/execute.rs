@@ -332,7 +332,7 @@ impl Sinumerik {
     /// Executes stops, the end and the return, and rejects what nothing has used.
     fn finish(&mut self, words: &mut Words, state: &mut State, lines: &mut dyn ProgramLines) -> Outcome<()> {
         let mut ends = false;
-        let mut returns = words.take_keyword("RET");
+        let mut returns = words.take_keyword("RET") | words.take_keyword("ENDPROC");
         let subprogram = words.integer("L")?;
         let times = if subprogram.is_some() { words.integer("P")?.unwrap_or(1) } else { 1 };
         for code in std::mem::take(&mut words.m) {

@@ -233,7 +233,9 @@ impl Sinumerik {
 /// Rejects words of axes that the machine lacks.
 fn require_axes(words: &Words, state: &State) -> Outcome<()> {
     for (axis, letter) in AXIS_LETTERS.into_iter().enumerate() {
-        if words.axes[axis].is_some() && !state.options.axes[axis] {
+        // A rotary axis that the machine lacks may stay at 0.
+        let moves = words.axes[axis].is_some_and(|(value, _)| !(3..6).contains(&axis) || value != 0.0);
+        if moves && !state.options.axes[axis] {
             let known = AXIS_LETTERS.into_iter().zip(state.options.axes).filter(|(_, has)| *has);
             let known = known.map(|(letter, _)| letter.to_string()).collect::<Vec<_>>().join(" ");
             return Err(format!("word {letter}: the machine has no axis {letter}; axes: {known}"));

@@ -280,6 +280,7 @@ fn is_keyword(name: &str) -> bool {
             | "CIP"
             | "CT"
             | "RET"
+            | "ENDPROC"
             | "TRAFOOF"
             | "ORIAXES"
             | "ORIVECT"

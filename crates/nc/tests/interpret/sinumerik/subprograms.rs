@@ -8,7 +8,7 @@ use crate::common::{motions, steps};
 
 #[test]
 fn subprograms_of_the_file_take_values() {
-    let cases: [(&str, &[f64]); 9] = [
+    let cases: [(&str, &[f64]); 10] = [
         (
             "%_N_MAIN_MPF\n;$PATH=/_N_WKS_DIR/_N_PART_WPD\nG0 X1\nHOLE\nX2\nHOLE P2\nM30\n%_N_HOLE_SPF\nG91 X10\nG90\nM17",
             &[1.0, 11.0, 2.0, 12.0, 22.0],
@@ -22,6 +22,7 @@ fn subprograms_of_the_file_take_values() {
         ),
         ("G91 G0\nADD_(2) P3\nM30\nPROC ADD_(REAL A_)\nX=A_\nRET", &[2.0, 4.0, 6.0]),
         ("L100 P3\nM30\n%_N_L100_SPF\nG91 G0 X1\nRET", &[1.0, 2.0, 3.0]),
+        ("G0 X1\nSTEP_(5)\nX2\nM30\nPROC STEP_(REAL A_)\nX=A_\nENDPROC\nX9", &[1.0, 5.0, 2.0]),
         ("CALL \"/_N_SPF_DIR/_N_UP_SPF\"\nM30\n%_N_UP_SPF\nG0 X6\nM17", &[6.0]),
         ("MCALL UP\nG0 X1\nX2\nMCALL\nX3\nM30\n%_N_UP_SPF\nG91 X10\nG90\nRET", &[1.0, 11.0, 2.0, 12.0, 3.0]),
     ];
