@@ -110,8 +110,7 @@ def test_a_set_back_wall_clock_is_logged_once_in_the_other_time_modes(wall: Wall
     """The axes keep their time, but the middleware drops `/clock` until the old time has passed."""
     with Node(["-p", argument], env=wall.environment) as process, AxesClient(process=process, connect=False) as drive:
         clock = SimClock(drive, 1000 * NANOSECONDS) if argument == "use_sim_time:=true" else None
-        if clock is not None:
-            clock.connect()
+        (clock or drive).connect()
         wall.set(-50.0)
         warning = "the wall clock was set back: until it has passed"
         drive.wait_for(lambda: warning in process.output(), 5, "warning")
