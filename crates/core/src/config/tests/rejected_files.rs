@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::{MIKRON, assert_rejected, line_of, mikron_with, rejection};
+use super::{MIKRON, assert_rejected, line_of, mikron, mikron_with, rejection};
 use crate::config::{Parameters, ValueSource};
 
 #[test]

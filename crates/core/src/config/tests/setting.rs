@@ -412,7 +412,7 @@ fn an_integer_of_more_than_64_bits_is_a_number() {
     let own = "mill:\n  ros__parameters: {max_points: 18446744073709551615}\n";
     let error = overlaid(own).expect_err("no integer");
     assert!(
-        error.starts_with("site.yaml:2: max_points: found number 18446744073709600000, expected integer"),
+        error.starts_with("site.yaml:2: max_points: found number 18446744073709552000, expected integer"),
         "{error}"
     );
 }
