@@ -376,6 +376,8 @@ fn files_of_other_nodes_that_ros_reads_are_accepted() {
     ] {
         assert_eq!(shared(line), Ok((mikron(), vec![format!("site.yaml:3: {reason}")])), "{line}");
     }
+    let slip = "/**:\n  ros__parameters: {update_rate: 50.0, type: diff}\nmill:\n  ros__parameters: {x.velocity_loop.gian: 4}\n";
+    assert!(overlaid(slip).is_err_and(|error| error.contains("unknown parameter x.velocity_loop.gian")));
     let both = shared("machine: ur5e\n    joints: [shoulder, elbow]").expect("a file of another node");
     assert_eq!((both.0, both.1.len()), (mikron(), 2));
     for (line, reason) in [
