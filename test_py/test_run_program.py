@@ -358,6 +358,26 @@ def test_the_stop_service_and_a_newer_program_end_a_program(programs: Follow) ->
     assert second.result(30).error_code == Result.STOPPED
 
 
+def test_the_number_of_planners_is_bounded(start: Callable[..., AxesClient]) -> None:
+    """A planner notices the end of its program between two motions; this program has none."""
+    drive = start()
+    assert drive.process is not None
+    threads = Path(f"/proc/{drive.process.pid}/task")
+    with Follow(drive, f"{drive.target}/run_program", kind=RunProgram) as programs:
+        assert programs.send(Goal(program=SQUARE)).result(30).error_code == Result.SUCCESSFUL
+        before = most = len(list(threads.iterdir()))
+        sent = []
+        for _ in range(60):
+            sent.append(programs.send(Goal(program="O1 while [1]\nO1 endwhile\nM2\n")))
+            most = max(most, len(list(threads.iterdir())))
+        allowed = {Result.PREEMPTED, Result.PROGRAM_ERROR, Result.INVALID_GOAL}
+        for goal_ in sent:
+            assert goal_.result(60).error_code in allowed
+            most = max(most, len(list(threads.iterdir())))
+        assert most - before <= 10
+        assert programs.send(Goal(program=SQUARE)).result(30).error_code == Result.SUCCESSFUL
+
+
 def test_a_long_program_needs_constant_memory() -> None:
     """Memory after minutes of a program is that after its first seconds."""
     # Without subscriptions at the rate of the position cycles, for which the middleware needs memory in waves.

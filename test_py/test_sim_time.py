@@ -243,6 +243,12 @@ def test_the_clock_is_changed_while_the_node_runs(start: Callable[..., AxesClien
         drive.set_parameters({"use_sim_time": True})
         values = state_of(drive, "waiting for /clock")
         assert (values["time"], values["clock"]) == ("sim", "none")
+        # Without waiting for the clock: a client waits for the result of its goal.
+        ended = drive.end(moved, 5)
+        assert (ended.status, ended.text) == (
+            TrajectoryResult.ABORTED,
+            "use_sim_time was set: the time is that of /clock",
+        )
         last = drive.latest("position")["x"]
         drive.drop_samples()
         clock = SimClock(drive, BEGIN)
@@ -254,7 +260,6 @@ def test_the_clock_is_changed_while_the_node_runs(start: Callable[..., AxesClien
             return stamp_of(drive._samples["states"][-1]) < time.time_ns() // 2
 
         drive.wait_for(follows, 10, "samples by /clock")
-        assert drive.end(moved, 5).status == TrajectoryResult.ABORTED
         first = clock.now
         clock.advance(1.0, 0.02)
         assert np.array_equal(

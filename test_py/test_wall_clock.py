@@ -11,6 +11,7 @@ from virtual_axes.msg import TrajectoryResult as R
 
 from action import line
 from node_process import Node
+from sim_clock import SimClock
 from virtual_axes_py.ros import NANOSECONDS, TSP_NS, AxesClient, joint_trajectory, status_values, to_ns, to_time
 
 LIBRARIES = sorted((Path(__file__).parents[1] / ".build/faketime").glob("usr/lib/*/faketime/libfaketimeMT.so.1"))
@@ -101,6 +102,26 @@ def test_a_slewed_wall_clock_is_no_step(drive: AxesClient, wall: WallClock) -> N
     number = drive.send(line(["x"], [0.01], 1.0))
     assert drive.end(number, 10).status == R.COMPLETED
     assert "the clock jumped" not in drive.process.output()
+
+
+@needs_faketime
+@pytest.mark.parametrize("argument", ["use_sim_time:=true", "time:=fast"])
+def test_a_set_back_wall_clock_is_logged_once_in_the_other_time_modes(wall: WallClock, argument: str) -> None:
+    """The axes keep their time, but the middleware drops `/clock` until the old time has passed."""
+    with Node(["-p", argument], env=wall.environment) as process, AxesClient(process=process, connect=False) as drive:
+        clock = SimClock(drive, 1000 * NANOSECONDS) if argument == "use_sim_time:=true" else None
+        (clock or drive).connect()
+        wall.set(-50.0)
+        warning = "the wall clock was set back: until it has passed"
+        drive.wait_for(lambda: warning in process.output(), 5, "warning")
+        if clock is not None:
+            for _ in range(20):
+                clock.set(clock.now + TSP_NS)
+                time.sleep(0.02)
+            wall.set(0.0)
+            clock.connect()
+        assert process.output().count(warning) == 1
+        assert "Did my clock jump" not in process.output()
 
 
 def test_stamps_of_another_clock_are_rejected_with_the_remedy(start: Callable[..., AxesClient]) -> None:

@@ -74,6 +74,16 @@ pub fn document_with_repeated_keys<T: DeserializeOwned>(text: &str) -> Result<T,
     serde_saphyr::from_str_with_options(text, options).map_err(|error| YamlError::new(&error, text))
 }
 
+/// Reads all documents of a text, whose mappings may repeat keys: `T` receives each of them. Empty documents are omitted.
+///
+/// # Errors
+/// [`YamlError`] for invalid YAML, and values that do not fit `T`.
+pub fn documents_with_repeated_keys<T: DeserializeOwned>(text: &str) -> Result<Vec<T>, YamlError> {
+    let mut options = options(Budget::default());
+    options.duplicate_keys = DuplicateKeyPolicy::LastWins;
+    serde_saphyr::from_multiple_with_options(text, options).map_err(|error| YamlError::new(&error, text))
+}
+
 /// Reads all documents of a text; empty documents are omitted. The length of the text bounds the number of nodes.
 ///
 /// # Errors

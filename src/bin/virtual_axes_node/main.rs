@@ -176,8 +176,8 @@ fn parameters(args: &RosArgs) -> Result<Parameters, Box<dyn std::error::Error>> 
                     match overlay.skipped.join(", ").as_str() {
                         "" => tracing::warn!("{file} contains no parameters"),
                         others => tracing::warn!(
-                            "{file} contains no parameters for {node}, only for {others}; -r __node:=NAME changes the \
-                             name of the node"
+                            "{file} contains no parameters for {node}, only for {others}; a section for a node in \
+                             any namespace is named `/**/NAME`, and -r __node:=NAME changes the name of the node"
                         ),
                     }
                 }

@@ -92,6 +92,8 @@ pub(super) struct Planning {
     pub(super) commands: mpsc::Sender<Command>,
     /// Receiver of the positions at which the motion begins, m or rad.
     pub(super) rest: oneshot::Receiver<Vec<f64>>,
+    /// Counter of the planners.
+    pub(super) planner: Arc<()>,
 }
 
 impl Planning {
@@ -114,7 +116,7 @@ impl Planning {
 
     /// Plans the program; blocks while enough is planned ahead.
     fn plan(self, runtime: &Handle) -> Result<(), String> {
-        let Planning { motion, source, start_line, machine, state, commands, rest } = self;
+        let Planning { motion, source, start_line, machine, state, commands, rest, planner: _planner } = self;
         let ProgramText { name, reader, folders } = source;
         // The sender is dropped if the motion is canceled before its start, or at shutdown.
         let Ok(rest) = rest.blocking_recv() else { return Ok(()) };

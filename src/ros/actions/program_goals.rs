@@ -46,6 +46,8 @@ pub struct ProgramGoals {
     pub running_out: watch::Sender<Arc<[RunningProgram]>>,
     /// Programs that have not ended.
     pub programs: HashMap<GoalId, ActiveProgram>,
+    /// Counter of the planners, which end after their programs.
+    pub planners: Arc<()>,
 }
 
 /// Program that has not ended.
@@ -70,7 +72,9 @@ async fn open(
 ) -> Result<ProgramText, (ProgramErrorCode, String)> {
     let invalid = |text: String| Err((ProgramErrorCode::InvalidGoal, text));
     if active >= MAX_ACTIVE_PROGRAMS {
-        return invalid(format!("{active} programs are active; at most {MAX_ACTIVE_PROGRAMS} are allowed"));
+        return invalid(format!(
+            "{active} programs are active or being ended; at most {MAX_ACTIVE_PROGRAMS} are allowed"
+        ));
     }
     if let Err(error) = check_feed_override(goal.feed_override) {
         return invalid(error.to_string());
@@ -104,7 +108,8 @@ impl GoalHandler for ProgramGoals {
         active: &[GoalId],
     ) -> Result<MotionId, RunProgramResult> {
         let (start_line, feed_override) = (goal.start_line as usize, goal.feed_override);
-        let source = match open(goal, self.builtin, self.program_folder.as_deref(), active.len()).await {
+        let active = active.len().max(Arc::strong_count(&self.planners) - 1);
+        let source = match open(goal, self.builtin, self.program_folder.as_deref(), active).await {
             Ok(source) => source,
             Err((code, text)) => {
                 warn!("{} rejected: {text}", goal_name(&id));
@@ -128,7 +133,8 @@ impl GoalHandler for ProgramGoals {
             axes.filter(|(_, axis)| axis.kind() == AxisKind::Linear).map(|(index, _)| index).collect();
         let _ = self.commands.send(Command::BeginMotion { id: motion, linear, rest: rest_out }).await;
         let (machine, commands) = (Arc::clone(&self.machine), self.commands.clone());
-        let planning = Planning { motion, source, start_line, machine, state, commands, rest };
+        let planner = Arc::clone(&self.planners);
+        let planning = Planning { motion, source, start_line, machine, state, commands, rest, planner };
         tokio::spawn(planning.run());
         Ok(motion)
     }

@@ -17,7 +17,7 @@ use crate::ros::services::ServiceError;
 use crate::ros::topics::{Output, OverflowPolicy, TopicFactory};
 use crate::ros_interface::NodeAction;
 use crate::validation::GoalId;
-use crate::validation::args::RosArgs;
+use crate::validation::args::{NameKind, RosArgs};
 use virtual_axes_core::config::QosConfig;
 use virtual_axes_core::simulation::MotionEnd;
 use virtual_axes_core::trajectory::{MotionId, Rejection};
@@ -102,31 +102,34 @@ impl<H: GoalHandler> ActionServer<H> {
         result_overflow: OverflowPolicy,
     ) -> Result<(Self, Output<Feedback<H>>), ServiceError> {
         let failed = |reason: String| ServiceError { name: H::ACTION.name.to_owned(), reason };
-        let name = args.resolve_service(H::ACTION.name).map_err(|e| failed(e.to_string()))?;
-        let part = |part: &str| format!("{name}/_action/{part}");
+        let part = |kind, part| {
+            args.resolve_action_part(kind, H::ACTION.name, part).map_err(|e| failed(e.to_string()))
+        };
+        let service = |name| part(NameKind::Service, name);
+        let topic = |name| part(NameKind::Topic, name);
         let own_type = |part: &str| format!("{}_{part}", H::ACTION.type_name());
         let of_service = |label: &str, reason: String| ServiceError { name: label.to_owned(), reason };
         let node = topics.node;
         let server = ActionServer {
             send_goal: node
-                .create_service_of_long_requests(&part("send_goal"), &own_type("SendGoal"), SERVICE_DEPTH)
+                .create_service_of_long_requests(&service("send_goal")?, &own_type("SendGoal"), SERVICE_DEPTH)
                 .map_err(|reason| of_service("send_goal", reason))?,
             cancel_goal: node
-                .create_service(&part("cancel_goal"), "action_msgs/srv/CancelGoal", SERVICE_DEPTH)
+                .create_service(&service("cancel_goal")?, "action_msgs/srv/CancelGoal", SERVICE_DEPTH)
                 .map_err(|reason| of_service("cancel_goal", reason))?,
             get_result: node
-                .create_service(&part("get_result"), &own_type("GetResult"), SERVICE_DEPTH)
+                .create_service(&service("get_result")?, &own_type("GetResult"), SERVICE_DEPTH)
                 .map_err(|reason| of_service("get_result", reason))?,
             status: topics
                 .action_output(
-                    &part("status"),
+                    &topic("status")?,
                     "action_msgs/msg/GoalStatusArray",
                     STATUS_QOS,
                     result_overflow,
                 )
                 .map_err(failed)?,
         };
-        let (topic, type_name) = (part("feedback"), own_type("FeedbackMessage"));
+        let (topic, type_name) = (topic("feedback")?, own_type("FeedbackMessage"));
         let feedback = topics.action_output(&topic, &type_name, FEEDBACK_QOS, overflow).map_err(failed)?;
         Ok((server, feedback))
     }

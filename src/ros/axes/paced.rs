@@ -14,7 +14,7 @@ use super::clock_follower::{ClockJump, ClockState, first_instant};
 use super::commands::{COMMAND_QUEUE, Clock, Command, SampleFrame};
 use super::health::ClockSource;
 use super::stepper::Axes;
-use super::wall::{self, IdleTimer};
+use super::wall::{self, IdleTimer, WallClockWatch, since_epoch};
 use virtual_axes_core::units::Nanoseconds;
 
 /// Condition for the computation of the next position cycle.
@@ -46,6 +46,9 @@ async fn changed(followed: &mut Option<watch::Receiver<ClockState>>) -> bool {
     }
 }
 
+/// Period of the comparison of the wall clock, which the axes do not follow, but the middleware does.
+const WATCH_PERIOD: Duration = Duration::from_secs(1);
+
 /// Runs until [`Command::SetClock`], and returns the clock, or until [`Command::Shutdown`]; waits while the queue of frames is
 /// full. `followed` is the state of the followed clock, `None` in `fast`. `has_stepped` is true after a position cycle of
 /// another clock.
@@ -59,9 +62,22 @@ pub(super) async fn run(
     let period = axes.simulation().period();
     let tick = Duration::from_nanos(period.unsigned_abs());
     let mut axes = PacedAxes { axes, waiting: VecDeque::new(), is_time_known: false, jumps: 0, has_stepped };
+    if axes.has_stepped && followed.is_some() {
+        // Until its first message, the time of the new clock is not known.
+        axes.axes.prepare_clock_change();
+    }
     let mut idle_timer = IdleTimer::default();
     let mut ticks_at = None;
+    let mut watch = WallClockWatch::new(since_epoch);
+    let mut watched_at = tokio::time::Instant::now();
     loop {
+        if watched_at.elapsed() >= WATCH_PERIOD {
+            if let Some((from, to)) = watch.step(since_epoch) {
+                wall::warn_if_set_back(from, to);
+                watch = WallClockWatch::new(since_epoch);
+            }
+            watched_at = tokio::time::Instant::now();
+        }
         loop {
             match commands.try_recv() {
                 Ok(Command::Shutdown) | Err(mpsc::error::TryRecvError::Disconnected) => return None,
@@ -97,6 +113,7 @@ pub(super) async fn run(
                     Some(command) => axes.receive(command),
                 },
                 is_open = changed(&mut followed) => if !is_open { return None },
+                () = tokio::time::sleep_until(watched_at + WATCH_PERIOD) => {}
                 () = until(ticks_at), if ticks_at.is_some() => {
                     ticks_at = None;
                     // An idle machine does not wait for space in the queue; it tries again at the next tick.

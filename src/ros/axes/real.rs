@@ -12,8 +12,8 @@ use tracing::warn;
 use super::commands::{Clock, Command, SampleFrame};
 use super::health::ClockSource;
 use super::stepper::Axes;
-use super::wall::{PaceClock, since_epoch};
-use virtual_axes_core::units::{Nanoseconds, seconds};
+use super::wall::{PaceClock, since_epoch, warn_if_set_back};
+use virtual_axes_core::units::Nanoseconds;
 
 /// Tasks that the axes' thread polls once per position cycle. They must neither block nor end.
 ///
@@ -62,14 +62,7 @@ pub(super) fn run(
 pub(super) fn follow_step(axes: &mut Axes, to: Nanoseconds) {
     let from = axes.next_time();
     axes.restart_at(from, to);
-    if to < from {
-        warn!(
-            "the wall clock was set back: until it has passed {:.3} s again, the middleware receives neither new \
-             participants nor best-effort topics such as load (it drops what comes before the newest sample); start the \
-             node again to receive them now",
-            seconds(from)
-        );
-    }
+    warn_if_set_back(from, to);
 }
 
 /// Polls a task without a waker; it is polled again in the next cycle in any case.

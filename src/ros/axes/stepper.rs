@@ -186,6 +186,12 @@ impl Axes {
         self.jump_to(first_instant(to, self.simulation.period()));
     }
 
+    /// Aborts all motions before a change to a clock whose time is not known yet.
+    pub(super) fn prepare_clock_change(&mut self) {
+        self.simulation.prepare_clock_change();
+        self.report_ends();
+    }
+
     /// Continues at the position cycle with the time `time`, ns.
     pub(super) fn jump_to(&mut self, time: Nanoseconds) {
         self.simulation.jump_to(time);

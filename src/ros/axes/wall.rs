@@ -1,11 +1,14 @@
 //! Wall clock as a sequence of position cycles, and the timer of an idle machine in `fast`.
 
+use std::sync::atomic::{AtomicI64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use tracing::warn;
+
 use virtual_axes_core::config::TimeMode;
 use virtual_axes_core::simulation::Simulation;
-use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds};
+use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, seconds};
 
 /// Largest number of late ticks of the idle timer that are made up for; earlier ones are skipped.
 const CATCH_UP: u32 = 10;
@@ -61,6 +64,48 @@ fn read_both(wall: impl Fn() -> Duration) -> (Instant, Duration, Duration) {
     best
 }
 
+/// Watch for a wall clock that is set, by the monotonic clock.
+pub(super) struct WallClockWatch {
+    /// Time of the wall clock at `instant`, ns since the Unix epoch.
+    time: Nanoseconds,
+    instant: Instant,
+}
+
+impl WallClockWatch {
+    /// Creates a watch that begins at the present time.
+    pub(super) fn new(wall: impl Fn() -> Duration) -> Self {
+        let (instant, shown, _) = read_both(wall);
+        WallClockWatch { time: Nanoseconds::try_from(shown.as_nanos()).unwrap_or(0), instant }
+    }
+
+    /// Returns the expected and the present time of the wall clock, ns, if it has been set since the construction.
+    pub(super) fn step(&self, wall: impl Fn() -> Duration) -> Option<(Nanoseconds, Nanoseconds)> {
+        let (now, shown, took) = read_both(wall);
+        let found = Nanoseconds::try_from(shown.as_nanos()).ok()?;
+        let passed =
+            |from: Instant, to: Instant| to.saturating_duration_since(from).as_nanos() as Nanoseconds;
+        let expected = self.time + passed(self.instant, now) - passed(now, self.instant);
+        let is_step = (found - expected).abs() > MAX_DIFFERENCE && took < MAX_READING_TIME;
+        is_step.then_some((expected, found))
+    }
+}
+
+/// Newest time from which the wall clock has been set back, ns.
+static SET_BACK_FROM: AtomicI64 = AtomicI64::new(0);
+
+/// Logs what the middleware does not receive if the wall clock has been set back, `from` one time `to` another, ns.
+pub(super) fn warn_if_set_back(from: Nanoseconds, to: Nanoseconds) {
+    if to < from {
+        let newest = SET_BACK_FROM.fetch_max(from, Ordering::Relaxed).max(from);
+        warn!(
+            "the wall clock was set back: until it has passed {:.3} s again, the middleware receives neither new \
+             participants nor best-effort topics such as load, and /clock with use_sim_time (it drops what comes before the \
+             newest sample); start the node again to receive them now",
+            seconds(newest)
+        );
+    }
+}
+
 /// Schedule of the position cycles on the monotonic clock.
 ///
 /// The wall clock is read at construction and compared afterwards; setting it neither stops nor accelerates the axes.
@@ -90,13 +135,8 @@ impl PaceClock {
 
     /// Returns the time of the wall clock, ns, if it has been set since the construction.
     pub(super) fn stepped_to(&self, wall: impl Fn() -> Duration) -> Option<Nanoseconds> {
-        let (now, shown, took) = read_both(wall);
-        let found = Nanoseconds::try_from(shown.as_nanos()).ok()?;
-        let passed =
-            |from: Instant, to: Instant| to.saturating_duration_since(from).as_nanos() as Nanoseconds;
-        let expected = self.time + passed(self.start, now) - passed(now, self.start);
-        let is_step = (found - expected).abs() > MAX_DIFFERENCE && took < MAX_READING_TIME;
-        is_step.then_some(found)
+        let watch = WallClockWatch { time: self.time, instant: self.start };
+        watch.step(wall).map(|(_, found)| found)
     }
 
     fn due(&self, k: i64) -> Instant {

@@ -18,7 +18,7 @@ const DEFAULTS: [(&str, LevelFilter); 3] = [
 ];
 
 /// Error messages about normal events: target, and beginning of the message.
-const NOISE: [(&str, &str); 4] = [
+const NOISE: [(&str, &str); 7] = [
     // A gap of more than 256 samples is truncated to one message and requested again.
     ("rustdds::structure::sequence_number", ""),
     // At shutdown the threads of the participant end before its endpoints.
@@ -26,6 +26,11 @@ const NOISE: [(&str, &str); 4] = [
     ("rustdds::dds::pubsub", "Cannot remove Writer"),
     // RustDDS leaves the multicast group by the default interface, not by the one it joined on.
     ("rustdds::network::udp_listener", "leave_multicast_group"),
+    // The wall clock was set back, of which the node warns once; this error repeats with each datagram.
+    ("rustdds::structure::dds_cache", "get_changes_in_range_best_effort: Did my clock jump"),
+    // Fast DDS sends a long request with one fragment more than its size needs.
+    ("rustdds::rtps::fragment_assembler", "insert_frags: "),
+    ("rustdds::rtps::fragment_assembler", "new_datafrag: rejected invalid DATAFRAG"),
 ];
 
 /// Returns true if `target` is a module of this program.

@@ -180,6 +180,7 @@ impl NodeTasks<'_> {
             ids: self.ids.clone(),
             running_out,
             programs: HashMap::new(),
+            planners: Arc::default(),
         };
         let (program, channels) = self.channels(handler, events.programs);
         topics.tasks.spawn(server.serve(channels));

@@ -284,6 +284,9 @@ impl TrajectoryResults {
                 (Status::Aborted, self.violation_text("goal", &violation))
             }
             MotionOutcome::Aborted(AbortReason::Reset) => (Status::Aborted, "reset".to_owned()),
+            MotionOutcome::Aborted(AbortReason::ClockChange) => {
+                (Status::Aborted, "use_sim_time was set: the time is that of /clock".to_owned())
+            }
             MotionOutcome::Aborted(AbortReason::ClockJump { from, to }) => {
                 let (from, to) = (seconds(from), seconds(to));
                 (Status::Aborted, format!("the clock jumped from {from:.3} s to {to:.3} s"))

@@ -266,6 +266,20 @@ impl RosArgs {
         self.resolve(NameKind::Service, name)
     }
 
+    /// Returns the fully qualified name of the topic or service `part` of the action `action`, after remapping. As in rcl,
+    /// a rule can name the part; otherwise, unlike there, one for the whole action applies.
+    ///
+    /// # Errors
+    /// [`NameError`] if a name is invalid, see [`NodeFqn::expand`].
+    pub fn resolve_action_part(&self, kind: NameKind, action: &str, part: &str) -> Result<String, NameError> {
+        let name = format!("{action}/_action/{part}");
+        let resolved = self.resolve(kind, &name)?;
+        if resolved != self.node.expand(&name)? {
+            return Ok(resolved);
+        }
+        Ok(format!("{}/_action/{part}", self.resolve_service(action)?))
+    }
+
     /// Expands `name`, then applies the first matching rule.
     fn resolve(&self, kind: NameKind, name: &str) -> Result<String, NameError> {
         let absolute = self.node.expand(name)?;

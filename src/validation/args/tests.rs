@@ -173,6 +173,22 @@ fn a_service_rule_does_not_apply_to_topics() {
     assert!(args.resolve_topic("stop it").is_err());
 }
 
+/// A rule for a part of an action applies as in rcl, before one for the whole action.
+#[test]
+fn parts_of_an_action_are_remapped() {
+    let line = "--ros-args -r ~/move/_action/status:=/goals -r rosservice://~/move/_action/send_goal:=go -r ~/move:=/m";
+    let args = run(line);
+    for (kind, part, name) in [
+        (NameKind::Topic, "status", "/goals"),
+        (NameKind::Topic, "feedback", "/m/_action/feedback"),
+        (NameKind::Service, "send_goal", "/go"),
+        (NameKind::Service, "get_result", "/m/_action/get_result"),
+        (NameKind::Topic, "send_goal", "/m/_action/send_goal"),
+    ] {
+        assert_eq!(args.resolve_action_part(kind, "~/move", part).as_deref(), Ok(name));
+    }
+}
+
 #[test]
 fn log_arguments_are_stored_per_logger() {
     let args = run("--ros-args --log-level warn --log-level rustdds:=Debug --disable-rosout-logs \

@@ -105,6 +105,14 @@ const PARAMETERS: &[ControllerParameter] = &[
     },
 ];
 
+/// Parameters of the controller that other nodes have, too.
+const COMMON: [&str; 3] = ["type", "update_rate", "is_async"];
+
+/// Returns true if nodes of other kinds have a parameter `key`, too.
+pub(super) fn is_common(key: &str) -> bool {
+    COMMON.contains(&key)
+}
+
 fn is_true(value: &Value) -> bool {
     value.flag() == Some(true)
 }

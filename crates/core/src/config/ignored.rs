@@ -27,9 +27,11 @@ pub(super) struct FileFilter<'a> {
 
 impl FileFilter<'_> {
     /// Returns true for the file of a controller: one with a parameter that only controllers have, or for a controller
-    /// manager.
+    /// manager. In a section for several nodes, `update_rate` may be that of another node.
     pub fn is_of_controller(&self, assignments: &[Assignment]) -> bool {
-        let has_parameter = || assignments.iter().any(|one| controller::find(&one.key).is_some());
+        let is_of_others = |key: &str| self.shared.contains(key) && controller::is_common(key);
+        let is_controllers = |key: &str| controller::find(key).is_some() && !is_of_others(key);
+        let has_parameter = || assignments.iter().any(|one| is_controllers(&one.key));
         !self.is_machine && (self.has_manager || has_parameter())
     }
 

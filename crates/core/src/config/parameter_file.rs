@@ -6,7 +6,7 @@ use serde_saphyr::Spanned;
 
 use super::error::{ConfigError, ValueSource};
 use super::value::Value;
-use super::yaml_tree::{YamlNode, parse};
+use super::yaml_tree::{YamlNode, parse, parse_documents};
 use crate::text::shortened;
 
 /// Key above the parameters of a node.
@@ -51,24 +51,30 @@ pub(super) fn read(
     source: &ValueSource,
     node: Option<&str>,
 ) -> Result<ParameterFile, ConfigError> {
-    let root = parse(text, source)?;
-    // All sections are commented out.
-    let is_empty = match &root.value {
+    // As rcl reads them; a machine file is one document.
+    let documents = match node {
+        Some(_) => parse_documents(text, source)?,
+        None => vec![parse(text, source)?],
+    };
+    let is_empty = |document: &Spanned<YamlNode>| match &document.value {
         YamlNode::Null => true,
         YamlNode::Map(entries) => entries.is_empty(),
         _ => false,
     };
-    if node.is_some() && is_empty {
+    // All sections are commented out.
+    if node.is_some() && documents.iter().all(is_empty) {
         return Ok(ParameterFile::default());
     }
-    let YamlNode::Map(entries) = root.value else {
-        return Err(not_a_parameter_file(
-            &source.at_line(root.referenced.line()),
-            format!("not a mapping; {EXPECTED}"),
-        ));
-    };
     let mut sections = Vec::new();
-    collect_sections(entries, "", source, &mut sections)?;
+    for document in documents {
+        let YamlNode::Map(entries) = document.value else {
+            return Err(not_a_parameter_file(
+                &source.at_line(document.referenced.line()),
+                format!("not a mapping; {EXPECTED}"),
+            ));
+        };
+        collect_sections(entries, "", source, &mut sections)?;
+    }
     if sections.is_empty() {
         return Err(not_a_parameter_file(source, format!("empty mapping; {EXPECTED}")));
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_saphyr::Spanned;
 
 use super::error::{ConfigError, ValueSource};
@@ -11,9 +11,19 @@ use crate::yaml::{self, YamlError};
 
 /// Reads one YAML document; its mappings may repeat keys.
 pub(super) fn parse(text: &str, source: &ValueSource) -> Result<Spanned<YamlNode>, ConfigError> {
-    yaml::document_with_repeated_keys(text).map_err(|YamlError { line, reason }| {
-        ConfigError::at(&source.at_line(line), format_args!("invalid YAML: {reason}"))
-    })
+    yaml::document_with_repeated_keys(text).map_err(|error| invalid(&error, source))
+}
+
+/// Reads all YAML documents of a text; their mappings may repeat keys.
+pub(super) fn parse_documents(
+    text: &str,
+    source: &ValueSource,
+) -> Result<Vec<Spanned<YamlNode>>, ConfigError> {
+    yaml::documents_with_repeated_keys(text).map_err(|error| invalid(&error, source))
+}
+
+fn invalid(YamlError { line, reason }: &YamlError, source: &ValueSource) -> ConfigError {
+    ConfigError::at(&source.at_line(*line), format_args!("invalid YAML: {reason}"))
 }
 
 /// Node of a YAML tree with the node types that parameter files use.
@@ -67,10 +77,11 @@ impl<'de> Visitor<'de> for NodeVisitor {
         Ok(YamlNode::Scalar(Value::Integer(value)))
     }
 
-    fn visit_u64<E: de::Error>(self, value: u64) -> Result<YamlNode, E> {
+    fn visit_u64<E>(self, value: u64) -> Result<YamlNode, E> {
         match i64::try_from(value) {
-            Ok(value) => self.visit_i64(value),
-            Err(_) => Err(E::custom(format!("integer {value} is larger than 9223372036854775807"))),
+            Ok(value) => Ok(YamlNode::Scalar(Value::Integer(value))),
+            // As in rcl.
+            Err(_) => Ok(YamlNode::Scalar(Value::Double(value as f64))),
         }
     }
 

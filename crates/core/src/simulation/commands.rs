@@ -97,13 +97,24 @@ impl Simulation {
     /// cleared. The motion of the axes does not depend on the absolute time.
     pub fn jump_to(&mut self, time: Nanoseconds) {
         let from = self.time_of(self.next - 1);
-        self.motions.abort_all(AbortReason::ClockJump { from, to: time }, from, &mut self.finished);
+        self.abort_motions(AbortReason::ClockJump { from, to: time });
+        self.grid.origin = time.saturating_sub(self.next.saturating_mul(self.grid.period));
+    }
+
+    /// Ends motions, loads and the stream as [`jump_to`](Self::jump_to) does, before a change to a clock whose time is not
+    /// known yet.
+    pub fn prepare_clock_change(&mut self) {
+        self.abort_motions(AbortReason::ClockChange);
+    }
+
+    fn abort_motions(&mut self, reason: AbortReason) {
+        let time = self.time_of(self.next - 1);
+        self.motions.abort_all(reason, time, &mut self.finished);
         // Before the first cycle the axes are at rest: a stop would make them busy for a cycle.
         if self.next > 0 || self.has_active_commands() {
             self.timeline.halt();
         }
         self.loads.clear();
-        self.grid.origin = time.saturating_sub(self.next.saturating_mul(self.grid.period));
     }
 
     /// Submits one streamed setpoint of a joint, m or rad, for the next position cycle.

@@ -42,6 +42,8 @@ pub enum AbortReason {
         /// Time of the position cycle after the jump, ns.
         to: Nanoseconds,
     },
+    /// Change to a clock whose time is not known yet.
+    ClockChange,
 }
 
 /// Finished motion with its outcome and figures.

@@ -263,6 +263,22 @@ fn canceling_one_motion_does_not_affect_other_joints() {
 }
 
 #[test]
+fn a_change_of_the_clock_aborts_motions_at_once() {
+    let mut fixture = SimulationFixture::new(NONE, 500 * SECOND_NS);
+    fixture.simulation.submit(A, line(&fixture, Start::Now)).expect("accepted");
+    let waits = fixture.trajectory(Start::At(520 * SECOND_NS), &["y"], &[(SECOND_NS, &[0.01])]);
+    fixture.simulation.submit(B, waits).expect("accepted");
+    setpoints(&mut fixture, 50);
+    fixture.simulation.prepare_clock_change();
+    let ends: Vec<_> = fixture.simulation.drain_finished().map(|e| (e.id, e.outcome)).collect();
+    let aborted = MotionOutcome::Aborted(AbortReason::ClockChange);
+    assert_eq!(ends, [(A, aborted), (B, aborted)]);
+    fixture.simulation.jump_to(0);
+    assert_controlled_stop(&setpoints(&mut fixture, 200));
+    assert!(next_finished(&mut fixture).is_none());
+}
+
+#[test]
 fn a_clock_jump_aborts_motions_and_stops_the_axes() {
     for target in [0, 1_700_000_000 * SECOND_NS, 3] {
         let mut fixture = SimulationFixture::new(NONE, 500 * SECOND_NS);

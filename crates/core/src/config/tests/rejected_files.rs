@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::{MIKRON, assert_rejected, line_of, mikron_with, rejection};
+use super::{MIKRON, assert_rejected, line_of, mikron, mikron_with, rejection};
 use crate::config::{Parameters, ValueSource};
 
 #[test]
@@ -93,6 +93,7 @@ fn alias_bomb() {
         text.push_str(&format!("    l{level}: &l{level} [{items}]\n"));
     }
     assert!(rejection(&text).starts_with("my.yaml:"));
+    assert!(mikron().overlay_yaml(&text, "site.yaml", Some("/mill")).is_err());
 }
 
 #[test]

@@ -376,6 +376,8 @@ fn files_of_other_nodes_that_ros_reads_are_accepted() {
     ] {
         assert_eq!(shared(line), Ok((mikron(), vec![format!("site.yaml:3: {reason}")])), "{line}");
     }
+    let slip = "/**:\n  ros__parameters: {update_rate: 50.0, type: diff}\nmill:\n  ros__parameters: {x.velocity_loop.gian: 4}\n";
+    assert!(overlaid(slip).is_err_and(|error| error.contains("unknown parameter x.velocity_loop.gian")));
     let both = shared("machine: ur5e\n    joints: [shoulder, elbow]").expect("a file of another node");
     assert_eq!((both.0, both.1.len()), (mikron(), 2));
     for (line, reason) in [
@@ -385,6 +387,36 @@ fn files_of_other_nodes_that_ros_reads_are_accepted() {
     ] {
         assert!(shared(line).is_err_and(|error| error.contains(reason)), "{line}");
     }
+}
+
+/// Values as rcl_yaml_param_parser of Jazzy reads them.
+#[test]
+fn all_documents_of_a_file_are_read() {
+    let text = "%YAML 1.1\n---\nmill:\n  ros__parameters: {x.velocity_loop.gain: 4}\n---\n---\nlathe:\n  ros__parameters: {cell: 1}\n\
+                ---\nmill:\n  ros__parameters:\n    x.velocity_loop.gain: 4.5\n    y.velocity_loop.gain: 3\n...\n";
+    let (parameters, warnings) = overlaid(text).expect("a valid file");
+    for (key, value) in [("x", 4.5), ("y", 3.0)] {
+        assert_eq!(parameters.get(&format!("{key}.velocity_loop.gain")), Some(Value::Double(value)));
+    }
+    assert_eq!(warnings, Vec::<String>::new());
+    let error = overlaid("lathe:\n  ros__parameters: {cell: 1}\n---\nmill: 5\n").expect_err("no section");
+    assert!(
+        error.starts_with("site.yaml:4: not a ROS 2 parameter file: no `ros__parameters` in `mill`"),
+        "{error}"
+    );
+}
+
+#[test]
+fn an_integer_of_more_than_64_bits_is_a_number() {
+    let other = "lathe:\n  ros__parameters: {mask: 18446744073709551615, big: 340282366920938463463374607431768211456, \
+                 low: -9223372036854775809}\nmill:\n  ros__parameters: {x.velocity_loop.gain: 4}\n";
+    assert_eq!(overlaid(other).map(|(_, warnings)| warnings), Ok(Vec::new()));
+    let own = "mill:\n  ros__parameters: {max_points: 18446744073709551615}\n";
+    let error = overlaid(own).expect_err("no integer");
+    assert!(
+        error.starts_with("site.yaml:2: max_points: found number 18446744073709552000, expected integer"),
+        "{error}"
+    );
 }
 
 #[test]
