@@ -133,6 +133,12 @@ def machine() -> va.Machine:
         (lambda m: m.simulate([{"x": 0.0}]), TypeError, "psec has the element {'x': 0.0} of type dict"),
         (lambda m: m.simulate({"x": [0.0, None]}), ValueError, "at 0.006 s: x: position is NaN"),
         (lambda m: va.identify(3, "x"), TypeError, "recording is of type int; it must be a path, a dictionary"),
+        (lambda m: va.optimize("vmc", STILL, {}, "x"), TypeError, "machine is of type str; it must be a Machine"),
+        (
+            lambda m: va.optimize(m, STILL, {"x.position_loop.gian": (1.0, 2.0)}, "x"),
+            ValueError,
+            "parameter 'x.position_loop.gian' is unknown; the nearest is x.position_loop.gain",
+        ),
     ],
 )
 def test_a_wrong_argument_is_named(call, error, text: str, machine: va.Machine) -> None:
