@@ -10,7 +10,7 @@ use super::text::{Text, prose};
 use super::tool_path::RunPath;
 
 /// Largest number of points in the charts of a page, so that a page has at most 8 MB.
-const MOST_POINTS: usize = 160_000;
+const MOST_POINTS: usize = 140_000;
 
 /// A self-contained page of sections.
 #[derive(Debug, Clone, Default, PartialEq)]

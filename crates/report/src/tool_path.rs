@@ -17,7 +17,7 @@ const MOST: usize = 16_384;
 /// Largest number of points of all paths of a page.
 const MOST_OF_PAGE: usize = 12_000;
 /// Size of the texts of lines of a page above which they are cut, bytes.
-const TEXT_BYTES: usize = 800_000;
+const TEXT_BYTES: usize = 700_000;
 /// Largest magnified error, as a fraction of the extent of the path.
 const SHARE: f64 = 0.15;
 /// Error below which the magnification does not increase, m; smaller errors are noise.
