@@ -45,7 +45,7 @@ def machine() -> va.Machine:
         (lambda m: m.simulate(STILL, signals=5), TypeError, "signals is 5; it must be a list"),
         (lambda m: m.simulate(STILL, loads=np.zeros((0, 5))), ValueError, "loads has no rows"),
         (lambda m: m.simulate(STILL, loads={"time": [0.0], "x": [1.0]}), ValueError, "loads has a column time"),
-        (lambda m: m.simulate({"x": (value for value in [0.0])}), TypeError, "psec of x is of type generator"),
+        (lambda m: m.simulate({"x": object()}), TypeError, "psec of x is of type object"),
         (lambda m: m.simulate(STILL).plot([]), ValueError, "axes is empty; it needs one or more of x, y"),
         (lambda m: va.Machine.from_yaml(b""), TypeError, "text is b''; it must be a text"),
         (lambda m: va.tune(m, STILL, controller="gpc", also=None), TypeError, "also is of type NoneType"),
