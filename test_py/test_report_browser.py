@@ -211,6 +211,55 @@ def test_texts_contrast_with_their_background(browser: Browser):
     browser.show_as()
 
 
+def test_lines_of_runs_differ_in_color_and_dash(browser: Browser):
+    """Each two colors differ by 15 of CIELAB also with a color vision deficiency, and each two dash patterns."""
+    for scheme in (LIGHT, DARK):
+        browser.show_as(scheme=scheme)
+        colors = [linear(browser, f"--run-{i}") for i in range(1, 7)]
+        for name, matrix in DEFICIENCIES.items():
+            seen = [lab(matrix @ color) for color in colors]
+            least = min(np.linalg.norm(a - b) for i, a in enumerate(seen) for b in seen[:i])
+            assert least > 15, f"{name}, {scheme}: {least:.1f}"
+    dashes = [
+        browser.evaluate(f"document.body.className = 'run-{i}', getComputedStyle(document.body).strokeDasharray")
+        for i in range(1, 7)
+    ]
+    browser.evaluate("document.body.className = ''")
+    assert len(set(dashes)) == 6, dashes
+    browser.show_as()
+
+
+def test_a_table_that_scrolls_has_a_shadow(browser: Browser, report: Path):
+    """The edge where columns are hidden is shaded; after scrolling it is the other edge."""
+    for scheme in (LIGHT, DARK):
+        browser.show_as(scheme=scheme, width=NARROW)
+        show(browser, report)
+        wide = "[...document.querySelectorAll('.table')].find(table => table.scrollWidth > table.clientWidth + 40)"
+        for scrolled in (False, True):
+            browser.evaluate(f"{wide}.scrollLeft = {9999 if scrolled else 0}")
+            box = f"(({{left, right, top}}) => [left, right, top + scrollY])({wide}.getBoundingClientRect())"
+            left, right, top = browser.evaluate(box)
+            row = browser.screenshot()[int(top) + 2]
+            ground = np.median(row, axis=0)
+            shaded = [np.abs(row[x] - ground).max() > 0.2 for x in (int(left) + 1, int(right) - 2)]
+            assert shaded == [scrolled, not scrolled], scheme
+    browser.show_as()
+
+
+def test_plots_keep_their_height_in_another_window(browser: Browser, report: Path):
+    """A change of the window's width, as by turning a telephone, leaves no plot over the text below it."""
+    browser.show_as()
+    show(browser, report)
+    heights = f"{PLOTS}.map(plot => [plot.clientHeight, plot.querySelector('svg').getBoundingClientRect().height])"
+    before = browser.evaluate(heights)
+    for width in (900, NARROW):
+        browser.show_as(width=width)
+        browser.screenshot()
+        time.sleep(0.5)
+        assert browser.evaluate(heights) == before
+    browser.show_as()
+
+
 def test_charts_over_time_zoom_together(browser: Browser, report: Path):
     """A range that is drawn in one chart is shown in the others; a double click shows all again."""
     if report.stem == "identification":
@@ -338,13 +387,40 @@ TEXTS = ["--ink", "--muted"]
 LINES = [*(f"--run-{i}" for i in range(1, 7)), "--low", "--middle", "--high", "--zero"]
 
 
-def luminance(browser: Browser, name: str) -> float:
-    """Returns the relative luminance of a color of the style (WCAG 2.1)."""
+DEFICIENCIES = {
+    "full vision": np.eye(3),
+    "protanopia": np.array(
+        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]
+    ),
+    "deuteranopia": np.array(
+        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+    ),
+    "tritanopia": np.array(
+        [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]]
+    ),
+}
+"""Linear RGB as seen with a color vision deficiency (Machado, Oliveira, Fernandes 2009, severity 1)."""
+
+
+def linear(browser: Browser, name: str) -> np.ndarray:
+    """Returns a color of the style as linear RGB."""
     value = browser.evaluate(f"getComputedStyle(document.documentElement).getPropertyValue('{name}').trim()")
     assert isinstance(value, str) and value.startswith("#") and len(value) == 7, value
     channels = np.array([int(value[i : i + 2], 16) / 255 for i in (1, 3, 5)])
-    linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
-    return float(linear @ [0.2126, 0.7152, 0.0722])
+    return np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
+
+
+def luminance(browser: Browser, name: str) -> float:
+    """Returns the relative luminance of a color of the style (WCAG 2.1)."""
+    return float(linear(browser, name) @ [0.2126, 0.7152, 0.0722])
+
+
+def lab(color: np.ndarray) -> np.ndarray:
+    """Returns CIELAB (D65) of linear RGB."""
+    to_xyz = [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+    ratios = to_xyz @ np.clip(color, 0, 1) / np.array([0.95047, 1.0, 1.08883])
+    x, y, z = np.where(ratios > 216 / 24389, np.cbrt(ratios), (24389 / 27 * ratios + 16) / 116)
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
 
 
 def keep(name: str) -> Path | None:

@@ -45,7 +45,7 @@ def machine() -> va.Machine:
         (lambda m: m.simulate(STILL, signals=5), TypeError, "signals is 5; it must be a list"),
         (lambda m: m.simulate(STILL, loads=np.zeros((0, 5))), ValueError, "loads has no rows"),
         (lambda m: m.simulate(STILL, loads={"time": [0.0], "x": [1.0]}), ValueError, "loads has a column time"),
-        (lambda m: m.simulate({"x": (value for value in [0.0])}), TypeError, "psec of x is of type generator"),
+        (lambda m: m.simulate({"x": object()}), TypeError, "psec of x is of type object"),
         (lambda m: m.simulate(STILL).plot([]), ValueError, "axes is empty; it needs one or more of x, y"),
         (lambda m: va.Machine.from_yaml(b""), TypeError, "text is b''; it must be a text"),
         (lambda m: va.tune(m, STILL, controller="gpc", also=None), TypeError, "also is of type NoneType"),
@@ -133,6 +133,12 @@ def machine() -> va.Machine:
         (lambda m: m.simulate([{"x": 0.0}]), TypeError, "psec has the element {'x': 0.0} of type dict"),
         (lambda m: m.simulate({"x": [0.0, None]}), ValueError, "at 0.006 s: x: position is NaN"),
         (lambda m: va.identify(3, "x"), TypeError, "recording is of type int; it must be a path, a dictionary"),
+        (lambda m: va.optimize("vmc", STILL, {}, "x"), TypeError, "machine is of type str; it must be a Machine"),
+        (
+            lambda m: va.optimize(m, STILL, {"x.position_loop.gian": (1.0, 2.0)}, "x"),
+            ValueError,
+            "parameter 'x.position_loop.gian' is unknown; the nearest is x.position_loop.gain",
+        ),
     ],
 )
 def test_a_wrong_argument_is_named(call, error, text: str, machine: va.Machine) -> None:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 import json
+import pickle
 import subprocess
+import warnings
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import virtual_axes_py as va
@@ -96,6 +100,83 @@ def both_encoders() -> dict[str, np.ndarray]:
     }
 
 
+def columns(campaign: Path) -> pd.DataFrame:
+    """Returns the recording as a table of channels."""
+    table = pd.read_csv(campaign).rename(columns=lambda name: name.removeprefix("x."))
+    return table[["time", "psec", "position", "current"]]
+
+
+def quick(table: object) -> va.Identification:
+    """Identifies X without refinement."""
+    return va.identify(table, "x", feedforward="off", refine=())
+
+
+def test_a_slip_in_the_name_of_a_column_gives_a_warning(campaign: Path, tmp_path: Path) -> None:
+    table = columns(campaign)
+    text = (
+        "column curent is not read; the nearest channel is current; rename it, or select it by column='current=curent'"
+    )
+    with pytest.warns(UserWarning, match=text):
+        quick(table.rename(columns={"current": "curent"}))
+    with pytest.warns(UserWarning, match="column velocty is not read; the nearest channel is velocity; rename it"):
+        expected = quick(table.assign(velocty=0.0)).parameters
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # The channel of the name is there, and a column of another axis.
+        assert quick(table.assign(**{"curent": 0.0, "y.velocty": 0.0})).parameters == expected
+
+
+@pytest.mark.parametrize("other", ["Current", " current ", "current [A]"])
+def test_two_columns_of_one_channel_are_rejected(campaign: Path, other: str) -> None:
+    table = columns(campaign)
+    table[other] = 2 * table["current"]
+    with pytest.raises(ValueError) as raised:
+        quick(table)
+    text = f"the columns 'current' and {other!r} for current; select one by its number: column='current=#4'"
+    assert text in str(raised.value)
+    chosen = va.identify(table, "x", feedforward="off", refine=(), column="current=#4")
+    assert chosen.parameters == quick(columns(campaign)).parameters
+
+
+def test_rows_without_order_and_joined_recordings_have_the_right_reason(campaign: Path) -> None:
+    table = columns(campaign)
+    with pytest.raises(ValueError, match="stamps are earlier than the one before; sort the rows by time"):
+        quick(table.sample(frac=1.0, random_state=1))
+    with pytest.raises(ValueError, match="stamps are earlier than the one before; sort the rows by time"):
+        quick(table[::-1])
+    noise = np.random.default_rng(1).normal(0.0, 1e-7, len(table))
+    again = table.assign(position=table["position"] + noise)
+    joined = quick(pd.concat([table, again]).sort_values("time", kind="stable"))
+    assert joined.parameters == quick(table).parameters
+    rows = f"{len(table)} rows have the stamp of the row before and nearly its position"
+    assert any(rows in line for line in joined.findings), joined.findings
+    # A clock of half the sampling rate has two samples for each stamp.
+    coarse = quick(table.assign(time=np.repeat(table["time"].to_numpy()[::2], 2)[: len(table)]))
+    assert not any("nearly its position" in line for line in coarse.findings)
+
+
+def test_recordings_come_from_iterators_and_without_times(campaign: Path) -> None:
+    table = columns(campaign)
+    expected = quick(table).parameters
+    assert quick(campaign.parent.glob("trace.csv")).parameters == quick(campaign).parameters
+    assert quick(map(columns, [campaign])).parameters == expected
+    period = float(table["time"][1] - table["time"][0])
+    timed = table.assign(time=period * np.arange(len(table)))
+    untimed = va.identify(table.drop(columns="time"), "x", feedforward="off", refine=(), rate_hz=1 / period)
+    assert untimed.parameters == pytest.approx(quick(timed).parameters, rel=1e-6)
+
+
+def test_an_identification_can_be_copied_and_pickled(campaign: Path) -> None:
+    found = quick(campaign)
+    assert copy.deepcopy(found).report() == copy.copy(found).report() == found.report()
+    again = pickle.loads(pickle.dumps(found))
+    assert (again.summary, again.findings, again.machine) == (found.summary, found.findings, found.machine)
+    assert repr(again) == repr(found) and pickle.loads(pickle.dumps(again)).summary == found.summary
+    with pytest.raises(ValueError, match="a copy from a pickle has no recordings to plot"):
+        again.report()
+    assert again._repr_html_() is None
+
+
 def test_both_encoders_identify_a_transmission(both_encoders: dict[str, np.ndarray]) -> None:
     found = va.identify([], "x", transmission=both_encoders)
     found_hz = found.summary["transmission"]["antiresonance_hz"]
@@ -119,7 +200,9 @@ def test_the_report_of_an_identification_has_its_values(campaign: Path) -> None:
     ("arguments", "options", "text"),
     [
         (("/nowhere.csv", "x"), {}, "/nowhere.csv"),
-        (({"time": [0.0], "angle": [0.0]}, "x"), {}, 'channel "angle" is unknown'),
+        (({"time": [0.0], "angle": [0.0]}, "x"), {}, "channel 'angle' is unknown"),
+        (({"time": [0.0], "curent": [0.0]}, "x"), {}, "channel 'curent' is unknown; the nearest is current"),
+        (({"position": [0.0]}, "x"), {}, "recording has no channel time (s); add it, or give rate_hz"),
         (({"time": [0.0, 1.0], "position": [0.0]}, "x"), {}, "recording 1"),
         ((([]), "x"), {}, "at least one"),
         (("/nowhere.csv", "w"), {}, '"w" is unknown; known are x, y, z, a, c'),

@@ -306,7 +306,7 @@ def test_a_search_draws_numbers_of_the_kind_of_the_parameter(machine: va.Machine
     ("parameters", "objective", "options", "text"),
     [
         (SEARCHED, "contour_error_um.mean", {}, "figure contour_error_um.mean is unknown; known are duration_s"),
-        ({"x.foo": (0, 1)}, "duration_s", {}, "x.foo is unknown"),
+        ({"x.foo": (0, 1)}, "duration_s", {}, "'x.foo' is unknown"),
         ({"x.position_loop.gain": (2.0, 1.0)}, "duration_s", {}, "lower one first"),
         ({"x.position_loop.gain": (0.0, 1.0, "log")}, "duration_s", {}, "x.position_loop.gain: bounds .* above 0"),
         (SEARCHED, "duration_s", {"constraints": {"margin.size": (0, None)}}, "margin.size: margins are modulus"),

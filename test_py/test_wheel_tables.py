@@ -277,15 +277,23 @@ def test_paths_are_accepted_and_the_version_is_that_of_the_command(machine: va.M
         va.Machine.load(3)
 
 
+KEYS = [f"{axis}.position_loop.gain" for axis in "xyzac"]
+
+
 def test_the_text_of_each_object_is_short(machine: va.Machine) -> None:
     run = machine.simulate(va.scenario("ballbar"))
     results = va.sweep(machine, [{"x.position_loop.gain": 2.0}], va.scenario("x-constant"))
     response = va.design.frequency_response(machine, "x")
+    model = va.design.model(machine, "x")
+    rst = va.design.gpc(model, 12, lambda_rel=0.1)
     objects = [machine, run, results, results[0], response, va.Stepper(machine), va.scenario("ballbar"), *run.circles()]
+    objects += [model, rst, va.design.margins(model, rst), va.random_variants(1, 5, {key: (0, 1) for key in KEYS})]
+    objects += va.sweep(machine, [dict.fromkeys(KEYS, 1.0)], va.scenario("x-constant"))
     for one in objects:
         assert len(repr(one)) < 160 and "\n" not in repr(one) and "object at" not in repr(one), repr(one)
     assert f"{run.figures['contour_error_um']['max']:.6g} µm" in repr(run)
     assert {"position", "contour_error", "following_error", "plot_polar"} <= set(dir(run))
+    assert {"gpc", "Rst"} <= set(dir(va.design)) and not {"Any", "Machine", "annotations"} & set(dir(va.design))
 
 
 def test_an_error_of_a_key_has_the_nearest_one(machine: va.Machine) -> None:
@@ -372,3 +380,40 @@ def test_labels_of_a_data_array_name_the_axes(machine: va.Machine) -> None:
     np.testing.assert_allclose(stepper.position, [1e-4, 0, 0, 0, 0], atol=1e-6)
     run = machine.simulate(np.zeros((5, 5)), loads=LabeledRow(c=0.0, x=500.0))
     assert [run.load_current[:, axis].any() for axis in (0, 4)] == [True, False]
+
+
+def test_iterators_and_named_series_are_setpoints(machine: va.Machine) -> None:
+    expected = machine.simulate({"x": X}).position
+    rows = np.column_stack([X, *[np.zeros_like(X)] * 4])
+    given = [
+        {"x": iter(X)},
+        {"x": map(float, X)},
+        (list(row) for row in rows),
+        pd.Series(X, name="x"),
+        pd.DataFrame({"y": 0.0 * X, "x": X})["x"],
+    ]
+    for one in given:
+        assert np.array_equal(machine.simulate(one).position, expected)
+    with pytest.raises(ValueError, match="axis 'xx' is unknown"):
+        machine.simulate(pd.Series(X, name="xx"))
+    changes = pd.DataFrame({"x.position_loop.gain": [1.0, 2.0]})
+    assert machine.with_(changes.iloc[1]) == machine.with_({"x.position_loop.gain": 2.0})
+    with pytest.raises(TypeError, match=r"variants is a DataFrame.*to_dict\('records'\)"):
+        va.sweep(machine, changes, va.scenario("x-constant"))
+    assert len(va.sweep(machine, changes.to_dict("records"), va.scenario("x-constant"))) == 2
+
+
+class LazyTable:
+    """Lazy table as of polars, whose columns are known when it is collected."""
+
+    def collect_schema(self) -> dict:
+        """Returns the types of the columns."""
+        return {"x": float}
+
+    def collect(self) -> pd.DataFrame:
+        """Returns the table."""
+        return pd.DataFrame({"x": X})
+
+
+def test_a_lazy_table_is_collected(machine: va.Machine) -> None:
+    assert np.array_equal(machine.simulate(LazyTable()).position, machine.simulate({"x": X}).position)

@@ -22,11 +22,16 @@ pub fn builtin_text(files: &BuiltinFiles, name: &str) -> Option<&'static str> {
 
 /// Returns `text` on one line, truncated to 120 characters.
 pub fn shortened(text: &str) -> String {
-    let mut out: String = text.chars().take(MAX_QUOTED_LENGTH).collect();
+    cut(text, MAX_QUOTED_LENGTH).replace(is_control, " ")
+}
+
+/// Returns the first `most` characters of `text`, with an ellipsis if it is longer.
+pub fn cut(text: &str, most: usize) -> String {
+    let mut out: String = text.chars().take(most).collect();
     if out.len() < text.len() {
         out.push('…');
     }
-    out.replace(is_control, " ")
+    out
 }
 
 /// Returns `text` with escape sequences instead of control characters: `\u{1b}`, `\n`.

@@ -13,7 +13,7 @@ use virtual_axes_core::design::{
 use virtual_axes_core::machine::{
     contour_axes, contour_response, design_controller, loop_response, prediction_model,
 };
-use virtual_axes_core::units::DEGREE;
+use virtual_axes_core::units::{DEGREE, Rounded};
 
 use crate::convert::value_error;
 use crate::machine::PyMachine;
@@ -119,7 +119,12 @@ impl PyPredictionModel {
     }
 
     fn __repr__(&self) -> String {
-        format!("PredictionModel(a={:?}, b={:?}, period={:?})", self.a(), self.b(), self.period())
+        format!(
+            "PredictionModel(a={}, b={}, period={})",
+            listed(&self.a()),
+            listed(&self.b()),
+            Rounded(self.period())
+        )
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Recreation<'py, (Vec<f64>, Vec<f64>, f64)> {
@@ -162,13 +167,24 @@ impl PyRst {
     }
 
     fn __repr__(&self) -> String {
-        format!("Rst(r={:?}, s={:?}, t={:?}, t_first={})", self.r(), self.s(), self.t(), self.t_first())
+        let [r, s, t] = [self.r(), self.s(), self.t()].map(|coefficients| listed(&coefficients));
+        format!("Rst(r={r}, s={s}, t={t}, t_first={})", self.t_first())
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Recreation<'py, Coefficients> {
         let this = slf.get();
         (slf.get_type().into_any(), (this.r(), this.s(), this.t(), this.t_first()))
     }
+}
+
+/// Returns coefficients with 6 digits, of many the first two and their number.
+fn listed(coefficients: &[f64]) -> String {
+    let shown = if coefficients.len() > 3 { 2 } else { coefficients.len() };
+    let mut texts: Vec<String> = coefficients[..shown].iter().map(|c| Rounded(*c).to_string()).collect();
+    if shown < coefficients.len() {
+        texts.push(format!("… {} in all", coefficients.len()));
+    }
+    format!("[{}]", texts.join(", "))
 }
 
 fn axis_of<'m>(machine: &'m PyMachine, name: &str) -> PyResult<&'m AxisConfig> {

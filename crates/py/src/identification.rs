@@ -95,12 +95,7 @@ impl GivenRecording<'_> {
                 "velocity_feedforward" => raw.velocity_feedforward = Some(values),
                 "torque_feedforward" => raw.torque_feedforward = Some(values),
                 "motor_position" => raw.motor_position = Some(values),
-                other => {
-                    return Err(value_error(format!(
-                        "channel {other:?} is unknown; known are time, psec, position, velocity, current, torque, \
-                         velocity_feedforward, torque_feedforward, motor_position"
-                    )));
-                }
+                other => return Err(value_error(format!("channel {other:?} is unknown"))),
             }
         }
         Ok(Source::Raw(Box::new(raw)))

@@ -5,6 +5,7 @@ use virtual_axes_core::assess::{AxisTrace, CircleTrace, SignalRecording, ToolTra
 use super::chart::{Band, BandClass, Chart, ChartAxis, ChartForm, ChartSeries, Panel, SeriesStyle};
 use super::document::Section;
 use super::extent::peak;
+use super::html::LINE_STYLES;
 use super::text::{axis_name, listed, rounded};
 use super::tool_path::ToolPath;
 use super::unit::DisplayUnit;
@@ -69,7 +70,7 @@ pub(super) fn errors(runs: &[ReportRun]) -> Option<Section> {
     let turns =
         orientation.iter().any(|s| peak(s.points.iter().map(|p| p[1])) > NEGLIGIBLE_ORIENTATION_ERROR);
     let programs = runs.iter().enumerate().filter_map(|(i, run)| Some((i, run.program?)));
-    let feeds = programs.flat_map(|(i, program)| program.feeds(i, &for_run(runs, i, "reached"))).collect();
+    let feeds = programs.flat_map(|(i, program)| program.feeds(i, runs[i].title)).collect();
     let panels = vec![
         panel("Contour error", DisplayUnit::MICROMETER, of_runs(|tool| &tool.contour_error)),
         panel("Orientation error", DisplayUnit::MILLIDEGREE, if turns { orientation } else { Vec::new() }),
@@ -143,7 +144,7 @@ pub(super) fn sections(runs: &[ReportRun]) -> Vec<Section> {
     let names: Vec<String> = at_rest.iter().map(stationary).collect();
     if !names.is_empty() {
         let verb = if names.len() == 1 { "is" } else { "are" };
-        let text = format!("{} {verb} stationary (largest following error).", listed(&names));
+        let text = format!("{} {verb} stationary; in parentheses: largest following error.", listed(&names));
         sections.push(Section { paragraphs: vec![text], ..Section::new("Stationary axes") });
     }
     sections
@@ -164,7 +165,7 @@ fn of_axis(runs: &[ReportRun], (axis, traces): &Axis) -> Section {
     };
     let mut positions: Vec<ChartSeries> = Vec::new();
     for &(run, trace) in traces {
-        let setpoint = signal(runs, run, "setpoint (PSEC)", SeriesStyle::Commanded, &trace.psec);
+        let setpoint = signal(runs, run, "setpoint", SeriesStyle::Commanded, &trace.psec);
         // Runs of the same motion share one setpoint line.
         if !positions.iter().any(|other| other.points == setpoint.points) {
             positions.push(ChartSeries { run: None, ..setpoint });
@@ -192,8 +193,8 @@ fn of_axis(runs: &[ReportRun], (axis, traces): &Axis) -> Section {
 fn current(runs: &[ReportRun], run: usize, trace: &AxisTrace) -> Panel {
     let line = |label: &str, style, values: &[f64]| signal(runs, run, label, style, values);
     let mut series = vec![
-        line("current setpoint", SeriesStyle::Commanded, &trace.current_setpoint),
-        line("motor current (SMC)", SeriesStyle::Line(run), &trace.current),
+        line("setpoint", SeriesStyle::Commanded, &trace.current_setpoint),
+        line(runs[run].title, SeriesStyle::Line(run), &trace.current),
     ];
     let parts = [
         ("friction", &trace.friction_current),
@@ -202,7 +203,7 @@ fn current(runs: &[ReportRun], run: usize, trace: &AxisTrace) -> Panel {
     ];
     for (i, (label, values)) in parts.into_iter().enumerate() {
         if peak(values.iter().copied()) > NEGLIGIBLE_CURRENT {
-            series.push(line(label, SeriesStyle::Line(run + 1 + i), values));
+            series.push(line(label, SeriesStyle::Line(LINE_STYLES - 1 - i), values));
         }
     }
     panel(for_run(runs, run, "Current"), DisplayUnit::AMPERE, series)

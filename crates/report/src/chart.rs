@@ -7,31 +7,6 @@ use super::unit::DisplayUnit;
 /// Values are in SI units and are labeled in the unit of their axis; a [`DisplayUnit`] of size 1 shows them
 /// unchanged. Values that are not finite, or beyond ±1e12 of the unit, are omitted and break a line. Long
 /// series are decimated; peaks are kept.
-///
-/// ```
-/// use virtual_axes_report::{Band, BandClass, Chart, ChartAxis, Document, Guide, Panel};
-/// use virtual_axes_report::{Section, ChartSeries, SeriesStyle, DisplayUnit};
-///
-/// let time = [0.0, 0.1, 0.2, 0.3];
-/// let measured = ChartSeries::from_xy("measured", SeriesStyle::Measured, &time, &[0.0, 1e-6, 2e-6, 1e-6]);
-/// let simulated = ChartSeries::from_xy("simulated", SeriesStyle::Simulated, &time, &[0.0, 2e-6, 2e-6, 0.0]);
-/// let deviation = Panel::new(ChartAxis::new("Deviation", DisplayUnit::MICROMETER), vec![measured, simulated]);
-/// let current = ChartSeries::from_xy("measured", SeriesStyle::Measured, &time, &[0.0, 4.0, 1.5, 1.5]);
-/// let current = Panel {
-///     lines: vec![Guide::new(1.5, "friction")],
-///     ..Panel::new(ChartAxis::new("Current", DisplayUnit::AMPERE), vec![current])
-/// };
-/// let chart = Chart {
-///     bands: vec![Band::new(BandClass::Accelerating, 0.0, 0.1)],
-///     ..Chart::new("A line", ChartAxis::new("Time", DisplayUnit::SECOND), vec![deviation, current])
-/// };
-/// let section = Section { charts: vec![chart], ..Section::new("Validation") };
-/// let document = Document { title: "X axis".into(), sections: vec![section], ..Document::default() };
-/// let mut page = Vec::new();
-/// document.write(&mut page)?;
-/// assert!(String::from_utf8_lossy(&page).contains("Deviation (µm)"));
-/// # Ok::<(), std::io::Error>(())
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
     /// Title above the plot.

@@ -6,11 +6,11 @@ use super::chart::Chart;
 use super::decimate;
 use super::html::Html;
 use super::table::Table;
-use super::text::Text;
+use super::text::{Text, prose};
 use super::tool_path::RunPath;
 
 /// Largest number of points in the charts of a page, so that a page has at most 8 MB.
-const MOST_POINTS: usize = 160_000;
+const MOST_POINTS: usize = 140_000;
 
 /// A self-contained page of sections.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -133,7 +133,7 @@ impl Section {
             let (class, word) = level.style();
             html.append(format_args!(
                 "<p class=\"notice {class}\"><strong>{word}</strong> {}</p>\n",
-                Text(text)
+                prose(text)
             ));
         }
         self.tables.iter().for_each(|table| html.table(table));

@@ -5,7 +5,7 @@ use std::fmt;
 use serde_json::Value;
 
 use super::chart::Chart;
-use super::text::Text;
+use super::text::{Text, prose};
 use super::tool_path::RunPath;
 
 /// Style sheet: layout, and colors for light, dark and print themes.
@@ -16,7 +16,7 @@ const SCRIPT: &str = include_str!("page.js");
 const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:";
 /// Number of line styles in the style sheet.
-const LINE_STYLES: usize = 6;
+pub(super) const LINE_STYLES: usize = 6;
 
 /// Returns plotly.js, the first of the scripts that plotly embeds; the other one is for formulas.
 fn plotly_script() -> String {
@@ -85,7 +85,7 @@ impl Html {
 
     /// Appends the results in one line each.
     pub(super) fn verdict(&mut self, lines: &[String]) {
-        lines.iter().for_each(|line| self.append(format_args!("<p class=\"verdict\">{}</p>\n", Text(line))));
+        lines.iter().for_each(|line| self.append(format_args!("<p class=\"verdict\">{}</p>\n", prose(line))));
     }
 
     /// Appends switches that hide and show the signals of the runs, unless there is only one; the script activates them.
@@ -105,7 +105,7 @@ impl Html {
 
     /// Appends a paragraph.
     pub(super) fn paragraph(&mut self, text: &str) {
-        self.append(format_args!("<p>{}</p>\n", Text(text)));
+        self.append(format_args!("<p>{}</p>\n", prose(text)));
     }
 
     /// Appends a chart, whose series have at most about `most` points.

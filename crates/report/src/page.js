@@ -1,7 +1,7 @@
 // Plots the figures of the page with Plotly: the path of the tool in space, and charts whose zoom, runs and cursor are linked.
 "use strict";
 (() => {
-  const DASHES = ["solid", "9px,4px", "3px,3px", "10px,3px,2px,3px", "16px,5px", "6px,2px,2px,2px"];
+  const DASHES = ["solid", "8px,4px", "2px,3px", "8px,3px,2px,3px", "18px,5px", "12px,3px,2px,3px,2px,3px"];
   const MARKERS = ["circle", "square", "x", "cross"];
   const MANY = 300;
   const PANEL = 150, PANEL_ALONE = 300, GAP = 18, PRINTED_WIDTH = 690;
@@ -38,7 +38,7 @@
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: color("area"),
       font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: color("muted") },
       legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", font: { color: color("ink") } },
-      modebar: { bgcolor: "rgba(0,0,0,0)", color: color("zero"), activecolor: color("ink") },
+      modebar: { bgcolor: color("page"), color: color("zero"), activecolor: color("ink") },
       hoverlabel: { bgcolor: color("page"), bordercolor: color("rule"), font: { color: color("ink") }, namelength: 40 },
     };
   }
@@ -70,7 +70,10 @@
     };
     if (isOverPath) Object.assign(layout.xaxis, { title: { text: "Path position (mm)" }, autorange: true, range: undefined });
     const traces = [], names = new Set();
-    const legend = name => ({ name: plain(name), legendgroup: name, showlegend: name !== "" && !names.has(name) && !!names.add(name) });
+    const legend = (name, look = "") => {
+      const key = name + look;
+      return { name: plain(name), legendgroup: key, showlegend: name !== "" && !names.has(key) && !!names.add(key) };
+    };
     panels.forEach((panel, i) => {
       const id = i === 0 ? "" : String(i + 1);
       const top = 1 - i * (PANEL + GAP) / plotted, bottom = panels.length > 1 ? top - PANEL / plotted : 0;
@@ -80,9 +83,14 @@
       if (panel.series.every(series => series.y.every(v => v === null)))
         layout.annotations.push({ text: "no values", showarrow: false, xref: "paper", yref: "paper", x: 0.5, y: (top + bottom) / 2 });
       for (const band of panel.bands) for (const [y0, y1] of band.ends)
-        layout.shapes.push({ ...shade(band), xref: "paper", x0: 0, x1: 1, yref: `y${id}`, y0, y1 });
-      for (const { at, label } of panel.lines) layout.shapes.push({ ...guide(label), xref: "paper", x0: 0, x1: 1,
-        yref: `y${id}`, y0: at, y1: at, label: { text: plain(label), textposition: "end", yanchor: "bottom", font: { color: color("ink") } } });
+        layout.shapes.push({ ...shade(band), ...legend(band.label), xref: "paper", x0: 0, x1: 1, yref: `y${id}`, y0, y1 });
+      for (const { at, label } of panel.lines) {
+        // Beside the rising points of a friction law, both ends are free.
+        const isUpper = panel.lines.every(other => other.at <= at), side = isUpper ? 0 : 1;
+        layout.shapes.push({ ...guide(), xref: "paper", x0: 0, x1: 1, yref: `y${id}`, y0: at, y1: at });
+        if (label) layout.annotations.push({ text: plain(label), showarrow: false, xref: "paper", x: side, xanchor: side ? "right" : "left", yref: `y${id}`,
+          y: panel.y.log ? Math.log10(at) : at, yanchor: isUpper ? "bottom" : "top", bgcolor: color("area"), borderpad: 1, font: { color: color("ink") } });
+      }
     });
     if (panels.length > 0 && data.bands.length > 0) {
       layout.yaxis99 = { domain: [0, 1], range: [0, 1], visible: false, fixedrange: true, overlaying: "y" };
@@ -93,7 +101,7 @@
       }
     }
     for (const { at, label } of data.lines)
-      layout.shapes.push({ ...guide(label), yref: "paper", y0: 0, y1: 1, x0: at, x1: at, label: { text: plain(label),
+      layout.shapes.push({ ...guide(), yref: "paper", y0: 0, y1: 1, x0: at, x1: at, label: { text: plain(label),
         textposition: "end", textangle: 0, xanchor: "left", yanchor: "top", padding: 6, font: { color: color("ink") } } });
     if (isTime && screen.cursor) {
       const x = at(screen.cursor.run, [screen.cursor.time])[0];
@@ -116,7 +124,7 @@
 
   function line(series, legend) {
     const { kind, style, run, errors } = series, hue = kind === "commanded" ? color("setpoint") : color(`run-${style % 6 + 1}`);
-    const trace = { type: "scatter", ...legend(series.label), y: series.y, meta: run, visible: isShown(run) };
+    const trace = { type: "scatter", ...legend(series.label, kind + style), y: series.y, meta: run, visible: isShown(run) };
     if (kind === "points") {
       const few = series.y.length <= MANY;
       const marker = { color: hue, symbol: MARKERS[style % 4], size: few ? 8 : 4, opacity: few ? 1 : 0.6 };
@@ -176,7 +184,7 @@
   });
 
   function hoverText(one, i) {
-    const number = one.lines[i], text = number ? `line ${number}: ${plain(one.texts[number] ?? "")}<br>` : "";
+    const number = one.lines[i], text = number ? `line ${number}: ${plain(space.data.texts[number] ?? "")}<br>` : "";
     const feed = one.feed.length ? `<br>feed ${digits(one.feed[i], "m/min")}${one.rapid[i] ? ", rapid traverse" : ""}` : "";
     const title = space.data.runs.length > 1 ? `${plain(one.title)}<br>` : "";
     return `${title}${text}${digits(one.time[i], "s")}, contour error ${digits(one.error[i], "µm")}${feed}`;
@@ -226,10 +234,29 @@
     const ticks = [];
     for (let power = Math.floor(low); power <= high; power++)
       for (const factor of high - low > 2 ? [1] : [1, 2, 5]) ticks.push(Number((factor * 10 ** power).toPrecision(3)));
-    const bar = space.plot.clientWidth < 500 ? { orientation: "h", y: -0.05, len: 0.9 } : { x: 1, len: 0.7 };
+    const bar = isNarrow() ? { orientation: "h", y: hasSpace ? 0 : -0.2, yanchor: hasSpace ? "bottom" : "top", len: 0.9 } : { x: 1, len: 0.7 };
     return { cmin: Math.min(low, high - 0.3), cmax: high, colorscale: [[0, color("low")], [0.5, color("middle")], [1, color("high")]],
       colorbar: { title: { text: "error (µm)" }, tickvals: ticks.map(Math.log10), ticktext: ticks.map(String), thickness: 12,
         outlinewidth: 0, ...bar } };
+  }
+
+  const isNarrow = () => space.plot.clientWidth < 500;
+
+  // Returns the ticks of an axis of the path: few where it is short, the last one with its name.
+  function coordinates(name, [low, high], longest) {
+    const step = roundStep((high - low) / Math.max(1, Math.round((isNarrow() ? 4 : 6) * (high - low) / longest)));
+    const tickvals = [];
+    for (let k = Math.ceil(low / step); k * step <= high; k++) tickvals.push(Number((k * step).toPrecision(12)));
+    return { tickvals, ticktext: tickvals.map((value, k) => (k === tickvals.length - 1 ? `${name} ` : "") + String(value).replace("-", "−")) };
+  }
+
+  // Returns the edge of the cube of the longest coordinate with which the path fills the plot in the chosen view.
+  function edge(spans, longest, height) {
+    const { x, y, z } = VIEWS[space.view], across = Math.hypot(x, y), all = Math.hypot(x, y, z), [a, b, c] = spans.map(span => span / longest);
+    const width = (a * Math.abs(y) + b * Math.abs(x)) / across;
+    const tall = (a * Math.abs(x) + b * Math.abs(y)) * Math.abs(z) / (across * all) + c * across / all;
+    const unit = 0.47 * height;
+    return Math.min(0.8 * space.plot.clientWidth / (width * unit), 0.7 * height / (tall * unit));
   }
 
   function path(data) {
@@ -254,10 +281,12 @@
       annotations.push({ x, y, z, text: one.lines[index] ? `line ${one.lines[index]}` : digits(one.time[index], "s"), ax: 30, ay: -40,
         arrowcolor: color("ink"), font: { color: color("ink"), size: 13 }, bgcolor: color("page"), bordercolor: color("rule") });
     }
-    const sceneAxis = (name, i) => ({ title: { text: `${name} (mm)` }, range: ranges[i], gridcolor: color("rule"), zeroline: false, showspikes: false,
-      showbackground: false, color: color("muted"), tickfont: { size: 11 }, nticks: spans[i] < longest / 4 ? 3 : 6 });
-    const ratio = spans.map(span => 1.75 * Math.min(1.1, space.plot.clientWidth / 600) * span / longest);
-    const layout = { ...base({ l: 0, r: 0, t: 0, b: 0 }), height: space.plot.clientWidth < 500 ? 360 : 430, scene: {
+    const away = ["Side", "Front", "Top"].indexOf(space.view);
+    const sceneAxis = (name, i) => ({ title: { text: "" }, range: ranges[i], gridcolor: color("rule"), zeroline: false, showspikes: false,
+      showbackground: false, color: color("muted"), tickfont: { size: 11 }, showticklabels: i !== away, ...coordinates(name, ranges[i], longest) });
+    const height = isNarrow() ? 360 : 430, low = isNarrow() ? 0.17 : 0, size = edge(spans, longest, (1 - low) * height);
+    const ratio = spans.map(span => size * span / longest);
+    const layout = { ...base({ l: 0, r: 0, t: 0, b: 0 }), height, scene: { domain: { y: [low, 1] },
       xaxis: sceneAxis("X", 0), yaxis: sceneAxis("Y", 1), zaxis: sceneAxis("Z", 2), aspectmode: "manual",
       aspectratio: { x: ratio[0], y: ratio[1], z: ratio[2] }, annotations, dragmode: "turntable",
       camera: { eye: VIEWS[space.view], up: { x: 0, y: 0, z: 1 }, center: { x: 0, y: 0, z: 0 }, projection: { type: "orthographic" } },
@@ -287,6 +316,8 @@
 
   function draw(figure) {
     const { traces, layout } = FORMS[figure.data.form](figure.data);
+    // A change of the window's width deletes the height of the layout.
+    figure.plot.style.height = `${layout.height}px`;
     Plotly.react(figure.plot, traces, layout, CONFIG);
     if (figure.isDrawn) return;
     figure.isDrawn = true;

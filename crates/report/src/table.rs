@@ -1,7 +1,7 @@
 //! Tables of figures and tables of facts.
 
 use super::html::{Html, swatch};
-use super::text::{Text, cell, is_number};
+use super::text::{Text, cell, is_number, prose};
 
 /// Number of characters above which a cell wraps as text.
 const LONG: usize = 24;
@@ -105,7 +105,7 @@ impl Html {
             match row.get(1).filter(|_| table.is_facts && is_same) {
                 Some(value) => {
                     let span = columns - 1;
-                    self.append(format_args!("<td class=\"same\" colspan=\"{span}\">{}</td>", Text(value)));
+                    self.append(format_args!("<td class=\"same\" colspan=\"{span}\">{}</td>", prose(value)));
                 }
                 None => (1..columns).for_each(|i| self.cell(table, i, row.get(i).map_or("", String::as_str))),
             }
@@ -134,7 +134,7 @@ impl Html {
             _ if !table.is_facts && text.chars().count() > LONG => " class=\"text\"",
             _ => "",
         };
-        self.append(format_args!("<td{class}>{}</td>", Text(&cell(text))));
+        self.append(format_args!("<td{class}>{}</td>", prose(&cell(text))));
     }
 }
 

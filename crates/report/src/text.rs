@@ -25,6 +25,22 @@ impl Display for Text<'_> {
     }
 }
 
+/// Returns untrusted text as HTML content, with pairs of backticks as code.
+pub(super) fn prose(text: &str) -> String {
+    let pieces: Vec<&str> = text.split('`').collect();
+    let mut out = String::new();
+    for (index, piece) in pieces.iter().enumerate() {
+        out += match index % 2 {
+            1 if index + 1 < pieces.len() => "<code>",
+            1 => "`",
+            _ if index > 0 => "</code>",
+            _ => "",
+        };
+        out += &Text(piece).to_string();
+    }
+    out
+}
+
 /// Separator between groups of three digits.
 const THIN_SPACE: char = '\u{202f}';
 /// Minus sign (U+2212), as wide as the plus sign.
@@ -124,6 +140,12 @@ mod tests {
             text,
             "&lt;/title&gt;&lt;script&gt;alert(&#39;1&#39;)&lt;/script&gt; &quot;&amp;&quot;\u{fffd}"
         );
+    }
+
+    #[test]
+    fn backticks_enclose_code() {
+        let text = prose("record (`psec --part <both>`), or 5` long");
+        assert_eq!(text, "record (<code>psec --part &lt;both&gt;</code>), or 5` long");
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 use virtual_axes_core::assess::ToolTrace;
+use virtual_axes_core::text::cut;
 use virtual_axes_core::units::{METER_PER_MINUTE, MICROMETER, MILLIMETER};
 use virtual_axes_nc::offline::CycleError;
 
@@ -14,7 +15,9 @@ use super::figure_json::rounded;
 /// Largest number of points of a path; of longer paths, points that show least are dropped.
 const MOST: usize = 16_384;
 /// Largest number of points of all paths of a page.
-const MOST_OF_PAGE: usize = 24_000;
+const MOST_OF_PAGE: usize = 12_000;
+/// Size of the texts of lines of a page above which they are cut, bytes.
+const TEXT_BYTES: usize = 700_000;
 /// Largest magnified error, as a fraction of the extent of the path.
 const SHARE: f64 = 0.15;
 /// Error below which the magnification does not increase, m; smaller errors are noise.
@@ -174,18 +177,29 @@ impl RunPath {
         let error = peak(points().map(|point| point.at.contour_error)).max(LEAST_ERROR);
         let magnification = round_down((SHARE * extent / error).max(1.0));
         let has_rapids = points().any(PathPoint::is_rapid);
-        let note =
-            if has_rapids { "color: contour error; dashed: rapid traverse" } else { "color: contour error" };
-        let runs: Vec<Value> = paths.iter().map(|run| run.json(MOST_OF_PAGE / paths.len())).collect();
-        let json = json!({ "form": "path", "magnification": magnification, "runs": runs });
+        let note = if has_rapids {
+            "mm; color: contour error; dashed: rapid traverse"
+        } else {
+            "mm; color: contour error"
+        };
+        let most = (MOST_OF_PAGE / paths.len().max(1)).max(MOST / 16);
+        let thinned = paths.iter().map(|run| {
+            let mut points = run.path.points.clone();
+            while points.len() > most {
+                points = thinned(&points);
+            }
+            points
+        });
+        let thinned: Vec<Vec<PathPoint>> = thinned.collect();
+        let runs: Vec<Value> = paths.iter().zip(&thinned).map(|(run, points)| run.json(points)).collect();
+        let lines: BTreeSet<usize> = thinned.iter().flatten().map(|point| point.at.line).collect();
+        let texts = paths.iter().flat_map(|run| &run.path.texts).filter(|(line, _)| lines.contains(line));
+        let texts = bounded(texts.map(|(line, text)| (*line, text.clone())).collect());
+        let json = json!({ "form": "path", "magnification": magnification, "runs": runs, "texts": texts });
         (!paths.is_empty()).then_some((note, json))
     }
 
-    fn json(&self, most: usize) -> Value {
-        let mut points = self.path.points.clone();
-        while points.len() > most.max(MOST / 16) {
-            points = thinned(&points);
-        }
+    fn json(&self, points: &[PathPoint]) -> Value {
         let column = |value: &dyn Fn(&PathPoint) -> f64| -> Vec<Value> {
             points.iter().map(|point| rounded(value(point))).collect()
         };
@@ -199,14 +213,25 @@ impl RunPath {
             "time": column(&|point| point.at.time),
             "path": column(&|point| point.at.path_position / MILLIMETER),
             "reference": columns(&|point, i| point.at.reference[i] / MILLIMETER),
-            "deviation": columns(&|point, i| (point.at.tip[i] - point.at.reference[i]) / MILLIMETER),
+            "deviation": columns(&|point, i| ((point.at.tip[i] - point.at.reference[i]) * 1e9).round() * 1e-6),
             "error": column(&|point| point.at.contour_error / MICROMETER),
             "feed": if has_lines { column(&|point| point.at.reached_feed / METER_PER_MINUTE) } else { Vec::new() },
             "rapid": if has_lines { column(&|point| f64::from(u8::from(point.is_rapid()))) } else { Vec::new() },
             "lines": if has_lines { lines } else { Vec::new() },
-            "texts": self.path.texts,
         })
     }
+}
+
+/// Cuts the texts of lines until they have at most [`TEXT_BYTES`] on the page.
+fn bounded(mut texts: BTreeMap<usize, String>) -> BTreeMap<usize, String> {
+    // Key, quotation marks and comma; each `<` is escaped.
+    let bytes = |text: &String| 12 + text.len() + 5 * text.matches(['<', '"', '\\']).count();
+    let mut most = texts.values().map(|text| text.chars().count()).max().unwrap_or(0);
+    while most > 8 && texts.values().map(bytes).sum::<usize>() > TEXT_BYTES {
+        most -= most / 4;
+        texts.values_mut().for_each(|text| *text = cut(text, most));
+    }
+    texts
 }
 
 /// Returns the largest number of the form 1, 2 or 5 times a power of ten that is at most `value`.

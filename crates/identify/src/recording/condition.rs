@@ -90,7 +90,8 @@ pub fn condition(
     let raw = renewed.as_ref().unwrap_or(raw);
     let mut ordered = sort_samples(raw, &mut findings)?;
     let mut columns = usable_columns(raw, &mut findings);
-    drop_copies(&mut ordered, &raw.name, columns.iter().flatten(), &mut findings);
+    let position = columns[POSITION].as_ref();
+    drop_copies(&mut ordered, &raw.name, position, columns.iter().flatten(), &mut findings);
     drop_constant_current(&raw.name, &mut columns, &mut findings);
     let Some(position) = &columns[POSITION] else {
         return Err(ConditioningError::new(&raw.name, NO_POSITION));

@@ -1,7 +1,7 @@
 //! Ordering of samples by their stamps: drops non-finite stamps, removes clock steps, sorts late samples.
 
 use super::{ConditioningError, Finding, RawRecording};
-use virtual_axes_core::statistics::median;
+use virtual_axes_core::statistics::{mean, median};
 use virtual_axes_core::units::Rounded;
 
 /// Fewest samples of a recording: 0.2 s at 6 ms.
@@ -10,6 +10,10 @@ const FEWEST: usize = 32;
 const OVERTAKEN: usize = 20;
 /// Backward step in periods up to which the order of the file is kept.
 const JITTER: f64 = 0.9;
+/// Sum of all steps of the stamps, relative to their range, above which the rows are in no order.
+const SHUFFLED: f64 = 4.0;
+/// Motion between rows of one stamp, relative to that between stamps, below which the rows of a stamp are one sample.
+const SAME_SAMPLE: f64 = 0.1;
 /// Gap in periods inserted at a clock step, whose true length is unknown.
 const CLOCK_STEP: f64 = 10.0;
 
@@ -60,10 +64,14 @@ pub(super) fn sort_samples(
         return Err(error(format!("every stamp is {} s; check the time column", Rounded(stamps[0]))));
     }
     let back = stamps.windows(2).filter(|pair| pair[1] < pair[0]).count();
-    if 2 * back > stamps.len() {
-        let count = stamps.len();
+    let count = stamps.len();
+    let range =
+        stamps.iter().fold(f64::MIN, |a, b| a.max(*b)) - stamps.iter().fold(f64::MAX, |a, b| a.min(*b));
+    let path: f64 = stamps.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
+    let is_shuffled = 4 * back > count && path > SHUFFLED * range;
+    if 2 * back > count || is_shuffled {
         return Err(error(format!(
-            "{back} of {count} stamps are earlier than the one before; check the time column"
+            "{back} of {count} stamps are earlier than the one before; sort the rows by time, or check the time column"
         )));
     }
     let mut ordered = OrderedSamples { rows, stamps };
@@ -75,13 +83,15 @@ pub(super) fn sort_samples(
     Ok(ordered)
 }
 
-/// Drops duplicate rows: same stamp and same values as the row before.
+/// Drops duplicate rows: same stamp and same values as the row before; also with other values if the axis moves between
+/// stamps only, as after two recordings of one motion were joined.
 ///
-/// Repeated stamps with different values mean that the clock of the logger is coarser than its sampling.
+/// Other repeated stamps with different values mean that the clock of the logger is coarser than its sampling.
 /// Equal rows of such a recording are kept; they are samples at standstill.
 pub(super) fn drop_copies<'a>(
     ordered: &mut OrderedSamples,
     name: &str,
+    position: Option<&Vec<f64>>,
     columns: impl Iterator<Item = &'a Vec<f64>> + Clone,
     findings: &mut Vec<Finding>,
 ) {
@@ -91,15 +101,33 @@ pub(super) fn drop_copies<'a>(
         columns.clone().all(|values| values[row].to_bits() == values[before].to_bits())
     };
     let repeated: Vec<usize> = (1..ordered.stamps.len()).filter(|&n| is_repeated(n)).collect();
-    if repeated.is_empty() || !repeated.iter().all(|&n| is_copy(n)) {
+    let are_copies = repeated.iter().all(|&n| is_copy(n));
+    let is_joined = position.is_some_and(|position| {
+        let step = |n: usize| (position[ordered.rows[n]] - position[ordered.rows[n - 1]]).abs();
+        let mean_step = |has_stamp: bool| {
+            let steps = (1..ordered.stamps.len()).filter(|&n| is_repeated(n) == has_stamp).map(step);
+            mean(&steps.filter(|step| step.is_finite()).collect::<Vec<_>>())
+        };
+        // A held position does not move within a stamp at all.
+        matches!((mean_step(true), mean_step(false)), (Some(w), Some(b)) if w > 0.0 && w < SAME_SAMPLE * b)
+    });
+    if repeated.is_empty() || !(are_copies || is_joined) {
         return;
     }
     let mut copies = repeated.iter().copied().peekable();
     let keep: Vec<usize> = (0..ordered.stamps.len()).filter(|&n| copies.next_if_eq(&n).is_none()).collect();
     ordered.rows = keep.iter().map(|&n| ordered.rows[n]).collect();
     ordered.stamps = keep.iter().map(|&n| ordered.stamps[n]).collect();
-    let what = format!("{name}: {} duplicate samples (same stamp and values) dropped", repeated.len());
-    findings.push(Finding::note("duplicate-stamps", what));
+    findings.push(if are_copies {
+        let what = format!("{name}: {} duplicate samples (same stamp and values) dropped", repeated.len());
+        Finding::note("duplicate-stamps", what)
+    } else {
+        let what = format!(
+            "{name}: {} rows have the stamp of the row before and nearly its position; the first row of each stamp is used",
+            repeated.len()
+        );
+        Finding::warning("duplicate-stamps", what, "give each recording by itself")
+    });
 }
 
 /// Replaces stamps that step back by less than a period with the latest stamp; the order of the file is kept.

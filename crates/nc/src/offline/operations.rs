@@ -5,6 +5,7 @@ use std::io::{self, BufRead};
 
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::machine::Machine;
+use virtual_axes_core::text::cut;
 use virtual_axes_core::units::seconds;
 
 use crate::plan::ProgramActivity;
@@ -272,7 +273,7 @@ fn comment(line: &str) -> Option<String> {
     let message = line.strip_prefix("MSG").map(|rest| rest.trim().trim_matches(['(', ')']).trim_matches('"'));
     let bracketed = line.strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
     let text = message.or(bracketed.filter(|text| !text.contains(['(', ')']))).or(line.strip_prefix(';'))?;
-    let text: String = text.trim().chars().filter(|c| !c.is_control()).take(TEXT).collect();
+    let text = cut(&text.trim().replace(char::is_control, ""), TEXT);
     text.chars().any(char::is_alphanumeric).then_some(text)
 }
 
@@ -287,5 +288,8 @@ mod tests {
         let found = comment_lines(text.as_bytes()).unwrap();
         let expected = [(4, "2D Contour1"), (9, "Drill"), (11, "Bore")];
         assert_eq!(found, expected.map(|(line, text)| (line, text.to_owned())));
+        let long = format!("({})", "ä".repeat(61));
+        assert_eq!(comment(&long), Some("ä".repeat(60) + "…"));
+        assert_eq!(comment(&long.replacen('ä', "", 1)), Some("ä".repeat(60)));
     }
 }

@@ -9,7 +9,7 @@ use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_core::encoding::{TextEncoding, decode};
 use virtual_axes_core::kinematics::{Kinematics, ToolPose};
 use virtual_axes_core::statistics::rms_of_sum;
-use virtual_axes_core::text::BuiltinFiles;
+use virtual_axes_core::text::{BuiltinFiles, cut};
 use virtual_axes_core::trajectory::PathPlace;
 use virtual_axes_core::trial::Tick;
 use virtual_axes_core::units::{Nanoseconds, seconds};
@@ -596,7 +596,7 @@ pub fn line_texts(
             break;
         }
         if lines.contains(&number) {
-            texts.insert(number, decode(&line).trim().chars().take(TEXT).collect());
+            texts.insert(number, cut(decode(&line).trim(), TEXT));
         }
     }
     Ok(texts)

@@ -67,6 +67,8 @@ def to_array(name: str, values: Any) -> NDArray[Any]:
         return values
     if isinstance(values, str | bytes):
         raise TypeError(f"{name} is {values!r}; it must have numbers")
+    if isinstance(values, Iterator):
+        values = list(values)
     try:
         array = np.asarray(values)
     except ValueError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -45,7 +46,8 @@ class SweepResult:
 
     def __repr__(self) -> str:
         """Returns the changes, and the error of a variant that failed."""
-        return f"SweepResult({self.changes})" if self.error is None else f"SweepResult({self.changes}, {self.error!r})"
+        parts = [self.changes] if self.error is None else [self.changes, self.error]
+        return f"SweepResult({', '.join(map(reprlib.repr, parts))})"
 
     def row(self) -> dict[str, Any]:
         """Returns parameters, figures with joined keys as `axes.x.peak_current_a`, and `error`."""

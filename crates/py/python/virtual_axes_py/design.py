@@ -47,7 +47,7 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Margins:
     """Stability margins of a stable loop L = B R / (A S)."""
 
@@ -61,6 +61,10 @@ class Margins:
     """Gain margin downwards, a factor below 1; 0 if there is none."""
     delay: float
     """Delay margin, s; infinite without crossover."""
+
+    def __repr__(self) -> str:
+        """Returns all margins with 6 digits."""
+        return f"Margins({', '.join(f'{name}={value:.6g}' for name, value in vars(self).items())})"
 
 
 @dataclass(frozen=True, repr=False)
@@ -326,3 +330,8 @@ def _in_z(numerator: list[float], denominator: list[float]) -> tuple[list[float]
     degree = max(len(numerator), len(denominator))
     padded = [list(p) + [0.0] * (degree - len(p)) for p in (numerator, denominator)]
     return padded[0], padded[1]
+
+
+def __dir__() -> list[str]:
+    """Returns the public names, without those of imported modules."""
+    return sorted({*__all__, "__doc__", "__file__", "__name__"})

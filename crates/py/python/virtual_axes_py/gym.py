@@ -375,3 +375,8 @@ class ContouringVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[An
 
 if ENVIRONMENT not in gymnasium.registry:
     gymnasium.register(ENVIRONMENT, entry_point=ContouringEnv, vector_entry_point=ContouringVectorEnv)
+
+
+def __dir__() -> list[str]:
+    """Returns the public names, without those of imported modules."""
+    return sorted({*__all__, "__doc__", "__file__", "__name__"})

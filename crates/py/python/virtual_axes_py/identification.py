@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+import warnings
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -11,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from .arguments import Named, named_errors, read_json, to_native, to_path, to_real, to_text
+from .arguments import Named, named_errors, read_json, to_native, to_path, to_real, to_text, unknown
 from .machine import Machine
 from .run import embedded_page
 from .tables import columns_of, numbers
@@ -36,14 +39,51 @@ CHANNELS = (
     "motor_position",
 )
 """Names of the channels of a recording, in SI."""
+UNREAD = " is not read; the nearest channel is "
+"""Part of a finding about a column that may be misspelled."""
+
+
+@dataclass(frozen=True)
+class _Stored:
+    """Identification without its recordings, as a pickle contains it."""
+
+    text: str
+    lines: list[str]
+    result: _native.Machine | None
+
+    def json(self) -> str:
+        """Returns the summary as JSON."""
+        return self.text
+
+    def findings(self) -> list[str]:
+        """Returns the findings."""
+        return self.lines
+
+    def machine(self) -> _native.Machine:
+        """Returns the machine with the identified values; that of a valid result."""
+        assert self.result is not None
+        return self.result
+
+    def report(self) -> str:
+        """Raises `ValueError`: the page needs the recordings."""
+        raise ValueError("a copy from a pickle has no recordings to plot; call report() on the original")
+
+
+def _restored(text: str, lines: list[str], machine: Machine | None) -> Identification:
+    """Returns an identification from a pickle."""
+    stored: Any = _Stored(text, lines, machine.native if machine else None)
+    return Identification(stored)
 
 
 class Identification:
-    """Identified parameters of an axis, with findings and the agreement with the recordings."""
+    """Identified parameters of an axis, with findings and the agreement with the recordings; immutable.
+
+    A pickle contains all but the recordings, so that its copy has no report.
+    """
 
     def __init__(self, native: _native.Identification) -> None:
         """Wraps a native result; use `identify`."""
-        self._native = native
+        self._native: Any = native
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -64,7 +104,8 @@ class Identification:
     @property
     def findings(self) -> list[str]:
         """Findings with their remedies, the most severe first: `invalid: …`, `missing: …`, `warning: …`, `note: …`."""
-        return self._native.findings()
+        lines: list[str] = self._native.findings()
+        return lines
 
     @property
     def is_valid(self) -> bool:
@@ -80,12 +121,25 @@ class Identification:
         return Machine(self._native.machine())
 
     def report(self) -> str:
-        """Returns the page of `virtual_axes identify --report` as HTML."""
-        return self._native.report()
+        """Returns the page of `virtual_axes identify --report` as HTML; `ValueError` for a copy from a pickle."""
+        page: str = self._native.report()
+        return page
 
-    def _repr_html_(self) -> str:
-        """Returns the report for a notebook."""
-        return embedded_page(self.report())
+    def _repr_html_(self) -> str | None:
+        """Returns the report for a notebook; None for a copy from a pickle, which shows its `repr`."""
+        return None if isinstance(self._native, _Stored) else embedded_page(self.report())
+
+    def __copy__(self) -> Identification:
+        """Returns the same object, which is immutable."""
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Identification:
+        """Returns the same object, which is immutable."""
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickles summary, findings and machine."""
+        return _restored, (self._native.json(), self.findings, self.machine if self.is_valid else None)
 
     def __repr__(self) -> str:
         """Returns axis, number of parameters and of findings."""
@@ -94,7 +148,7 @@ class Identification:
 
 
 def identify(
-    recordings: Recording | Sequence[Recording],
+    recordings: Recording | Iterable[Recording],
     axis: str,
     machine: Machine | None = None,
     *,
@@ -122,8 +176,10 @@ def identify(
     `position` and `psec` (m or rad), `velocity` (m/s or rad/s of the axis), `current` (A), `torque` (N·m),
     `velocity_feedforward` (rad/s of the motor), `torque_feedforward` (N·m) and `motor_position` (m or rad at the axis);
     or tables, as a DataFrame of pandas or polars, whose columns are either these channels or are read as those of CSV:
-    names and units as `x.position`, `ENC_POS|1 [mm]`, or those of `column`. A named index is a column. `machine`
-    (default: the first built-in one) has the initial values.
+    names and units as `x.position`, `ENC_POS|1 [mm]`, or those of `column`. A named index is a column; a column whose
+    name is nearly that of a missing channel gives a `UserWarning`. Several are a sequence or an iterator, as
+    `Path.glob` returns it. `machine` (default: the first built-in one) has the initial values. Without times, `rate_hz`
+    is the sampling rate.
 
     The options are those of the command: `transmission` are recordings with the encoders of motor and load, to identify
     stiffness, damping, inertia of the load and backlash, beside `recordings` or alone with `[]`; `validate` are
@@ -157,10 +213,14 @@ def identify(
         "presliding": presliding,
     }
     native = to_native(machine if machine is not None else Machine.load())
-    files, both, others = _sources(recordings), _sources(transmission), _sources(validate)
+    files, both, others = (_sources(given, options) for given in (recordings, transmission, validate))
     try:
         with named_errors(options):
-            return Identification(_native.identify(native, to_text("axis", axis), files, both, others, options))
+            found = Identification(_native.identify(native, to_text("axis", axis), files, both, others, options))
+            for line in found.findings:
+                if UNREAD in line:
+                    warnings.warn(line.removeprefix("warning: ").replace("--column ", "column="), stacklevel=2)
+            return found
     except ValueError as error:
         # The options of the command have the names of the arguments, with dashes.
         text = str(error)
@@ -177,25 +237,51 @@ def _rate(given: float) -> float:
     return rate_hz
 
 
-def _sources(given: Recording | Sequence[Recording]) -> list[Source]:
+def _sources(given: Recording | Iterable[Recording], options: Mapping[str, Any]) -> list[Source]:
     """Returns recordings as the native module takes them."""
-    several = given if isinstance(given, list | tuple) else [given]
-    return [_source(one) for one in several]
+    several = given if isinstance(given, list | tuple | Iterator) and not hasattr(given, "read") else [given]
+    return [_source(one, options) for one in several]
 
 
-def _source(given: Any) -> Source:
+def _source(given: Any, options: Mapping[str, Any]) -> Source:
     """Returns a recording as the native module takes it: a path, channels, or names and values of columns."""
     if isinstance(given, Mapping) and not hasattr(given, "data_vars"):
-        return {to_text("channel", name): _channel(name, values) for name, values in given.items()}
+        wrong = [name for name in given if to_text("channel", name) not in CHANNELS]
+        if wrong:
+            raise ValueError(unknown("channel", wrong[0], CHANNELS))
+        return _timed({name: _channel(name, values) for name, values in given.items()}, options)
     columns = None if isinstance(given, str | os.PathLike) else columns_of("recording", given, skip_texts=True)
     if columns is None and not isinstance(given, str | bytes | os.PathLike):
         text = "it must be a path, a dictionary of channels, or a table, as Run.to_pandas() returns it"
         raise TypeError(f"recording is of type {type(given).__name__}; {text}")
     if columns is None:
         return to_path("recording", given)
+    _check_names(columns, options["column"])
     if all(name in CHANNELS for name in columns):
-        return columns
+        return _timed(columns, options)
     return list(columns), [np.ascontiguousarray(values) for values in columns.values()]
+
+
+def _check_names(columns: Iterable[str], selected: Sequence[str]) -> None:
+    """Raises `ValueError` for two columns with the name of one channel, whatever their case and unit."""
+    same = defaultdict(list)
+    for number, title in enumerate(columns, 1):
+        same[title.partition("[")[0].strip().lower()].append((title, number))
+    for channel, titles in same.items():
+        if len(titles) > 1 and channel in CHANNELS and not any(one.startswith(f"{channel}=") for one in selected):
+            listed = " and ".join(repr(title) for title, _ in titles)
+            remedy = f"select one by its number: column='{channel}=#{titles[0][1]}'"
+            raise ValueError(f"recording has the columns {listed} for {channel}; {remedy}")
+
+
+def _timed(channels: dict[str, NDArray[np.float64]], options: Mapping[str, Any]) -> dict[str, NDArray[np.float64]]:
+    """Returns channels with times; those without have the sampling rate of the options."""
+    rate_hz = options["rate_hz"]
+    if "time" in channels or not channels:
+        return channels
+    if rate_hz is None:
+        raise ValueError("recording has no channel time (s); add it, or give rate_hz")
+    return {"time": np.arange(max(map(len, channels.values()))) / rate_hz, **channels}
 
 
 def _channel(name: str, values: ArrayLike) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _native
 from .arguments import Named, named_errors, read_json, to_floats, to_path, to_text, unknown
 from .run import Run
-from .tables import TIME, axis_columns, axis_values
+from .tables import TIME, axis_columns, axis_values, named_table
 
 if TYPE_CHECKING:
     from .tables import Table
@@ -85,10 +85,10 @@ class Machine:
         The keys and units are those of the machine file, as `x.position_loop.gain`. Raises `ValueError` for an unknown
         parameter or a value out of range, `TypeError` for a value of another kind.
         """
-        if not isinstance(changes, Mapping):
+        if not isinstance(changes, Mapping) and not (hasattr(changes, "keys") and getattr(changes, "ndim", 0) == 1):
             example = '{"x.position_loop.gain": 2.0}'
             raise TypeError(f"changes is of type {type(changes).__name__}; it must be a dictionary, as {example}")
-        return Machine(self._native.with_(dict(changes)))
+        return Machine(self._native.with_({str(key): changes[key] for key in changes.keys()}))
 
     def with_controller(self, axis: str, rst: _native.Rst, *, allow_unstable: bool = False) -> Machine:
         """Returns a copy whose axis has a position controller in RST form, as of `design.gpc` or `design.rst`.
@@ -237,7 +237,7 @@ class Machine:
             raise TypeError(
                 f"{name} is {psec!r}; a scenario is scenario(name), a part program nc_program(name_or_path)"
             )
-        columns = axis_columns(self, name, psec)
+        columns = axis_columns(self, name, named_table(psec))
         if columns is None:
             return self._checked(to_floats(name, psec))
         if TIME in columns:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import design
-from .arguments import to_whole
+from .arguments import to_native, to_whole, unknown
 from .chunks import Setup, SweepResult, flat
 from .machine import Machine
 from .shards import setup_identity
@@ -75,14 +75,15 @@ def optimize(
     if trials < 1 or batch < 1:
         raise ValueError(f"trials {trials}, batch {batch}: must be at least 1")
     limits = dict(constraints or {})
-    unknown = [key for key in limits if key.startswith("margin.") and key[7:] not in MARGINS]
-    if unknown:
-        raise ValueError(f"constraint {unknown[0]}: margins are {', '.join(MARGINS)}")
+    wrong = [key for key in limits if key.startswith("margin.") and key[7:] not in MARGINS]
+    if wrong:
+        raise ValueError(f"constraint {wrong[0]}: margins are {', '.join(MARGINS)}")
+    to_native(machine)
     study = _open(storage, name, seed)
     known = machine.parameters
     missing = [key for key in parameters if key not in known]
     if missing:
-        raise ValueError(f"parameter {missing[0]} is unknown")
+        raise ValueError(unknown("parameter", missing[0], known))
     start = {key: known[key] for key in parameters}
     distributions = {key: _distribution(key, bounds, start[key]) for key, bounds in parameters.items()}
     if storage is not None:

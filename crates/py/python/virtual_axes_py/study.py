@@ -79,7 +79,7 @@ class SweepResults(Sequence[SweepResult]):
         return pandas.DataFrame([one.row() for one in self._results])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RandomVariants(Sequence[Mapping[str, "Parameter"]]):
     """Uniformly drawn variants that are computed when they are read."""
 
@@ -95,6 +95,10 @@ class RandomVariants(Sequence[Mapping[str, "Parameter"]]):
     def __len__(self) -> int:
         """Returns the number of variants."""
         return self.end - self.first
+
+    def __repr__(self) -> str:
+        """Returns the numbers of variants and of parameters, and the seed."""
+        return f"RandomVariants({len(self)} variants of {len(self.bounds)} parameters, seed {self.seed})"
 
     def __getitem__(self, index: Any) -> Any:
         """Returns the changed parameters of one variant, or the variants of a slice."""
@@ -250,6 +254,9 @@ def _dictionaries(variants: Sequence[Mapping[str, Parameter]]) -> list[Mapping[s
     """Returns the variants as a list; raises `TypeError` for anything but dictionaries."""
     if isinstance(variants, Mapping):
         raise TypeError("variants is a dictionary; it must be a sequence of dictionaries of changed parameters")
+    if hasattr(variants, "columns"):
+        remedy = "table.to_dict('records') of pandas or table.to_dicts() of polars"
+        raise TypeError(f"variants is a {type(variants).__name__}; it must be a sequence of dictionaries: {remedy}")
     rows = list(variants)
     for index, row in enumerate(rows):
         if not isinstance(row, Mapping):

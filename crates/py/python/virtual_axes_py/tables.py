@@ -31,10 +31,11 @@ class Table(Protocol):
 def columns_of(name: str, given: Any, *, skip_texts: bool = False) -> dict[str, NDArray[np.float64]] | None:
     """Returns the columns of a table by name; None for anything without names, as an array.
 
-    The columns are those of a DataFrame of pandas or polars, of a table of PyArrow, of a structured array of NumPy, of
-    a dictionary, or the variables of a dataset of xarray. A DataArray with two dimensions has a column for each label
-    of the one with texts. A named index or coordinate is a column too. Durations and dates become seconds, dates
-    from the first one, with or without a time zone. Columns of anything but numbers are left out with `skip_texts`.
+    The columns are those of a DataFrame of pandas or polars or of a LazyFrame, of a table of PyArrow, of a structured
+    array of NumPy, of a dictionary, or the variables of a dataset of xarray. A DataArray with two dimensions has a
+    column for each label of the one with texts. A named index or coordinate is a column too. Durations and dates
+    become seconds, dates from the first one, with or without a time zone. Columns of anything but numbers are left out
+    with `skip_texts`.
 
     Raises `ValueError` for columns of different lengths or with one name, and for an index of numbers without a name;
     `TypeError` for anything but numbers.
@@ -61,6 +62,8 @@ def columns_of(name: str, given: Any, *, skip_texts: bool = False) -> dict[str, 
 
 def _pairs(name: str, given: Any) -> Iterable[tuple[Any, Any]] | None:
     """Returns labels and values of the columns of a table, None for anything else."""
+    if hasattr(given, "collect_schema") and hasattr(given, "collect"):
+        given = given.collect()
     if isinstance(given, np.ndarray):
         return None if given.dtype.names is None else [(label, given[label]) for label in given.dtype.names]
     if hasattr(given, "data_vars"):
@@ -110,6 +113,13 @@ def _of_pandas(name: str, table: Any) -> list[tuple[Any, Any]] | None:
     if not named and list(table.columns) == list(range(table.shape[1])):
         return None
     return named + [(label, table.iloc[:, position]) for position, label in enumerate(table.columns)]
+
+
+def named_table(given: Any) -> Any:
+    """Returns a Series or a DataArray of one dimension as a table, if it has a name; anything else as it is."""
+    if not isinstance(getattr(given, "name", None), str) or len(getattr(given, "shape", ())) != 1:
+        return given
+    return given.to_dataset() if hasattr(given, "to_dataset") else given.to_frame()
 
 
 def numbers(name: str, values: Any) -> NDArray[np.float64]:

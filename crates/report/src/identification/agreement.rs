@@ -86,11 +86,6 @@ fn fill(page: &IdentificationPage, section: &mut Section, compared: &[Compared])
     if !residuals.is_empty() {
         section.tables.push(figures::agreement(found, &residuals));
     }
-    section.paragraphs.extend(
-        residuals
-            .iter()
-            .filter_map(|(name, residuals)| Some(figures::baseline(found, name, residuals)? + ".")),
-    );
     if residuals.iter().any(|(_, residuals)| residuals.inverse_dynamics.is_some()) {
         section.paragraphs.push(
             "Inverse dynamics is the current that is required for the recorded motion (Prévost eqs. 1 and \

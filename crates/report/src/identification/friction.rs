@@ -130,7 +130,7 @@ fn chart(
         FrictionLaw::Linear => "linear",
     };
     let panel = Panel {
-        lines: vec![Guide::new(i0, format!("i0 = {} A", digits(i0, 4)))],
+        lines: vec![Guide::new(i0, format!("i0 = {} A", digits(i0, 4))), Guide::new(-i0, "−i0")],
         ..Panel::new(ChartAxis::new("Friction current", DisplayUnit::AMPERE), series)
     };
     Chart {

@@ -22,7 +22,6 @@ pub(super) fn section(page: &IdentificationPage, machine_file: Option<&str>) -> 
     section.paragraphs.push(format!("{verdict} {}.", capital(&figures::verdict(summary))));
     section.notices = invalid.into_iter().map(notice).collect();
     section.paragraphs.extend(machine_file.map(str::to_owned));
-    section.paragraphs.extend(comparisons(summary));
     if summary.validation.is_empty() {
         section.paragraphs.push(
             "No recording was kept for validation (--validate): how the model predicts another program is not shown."
@@ -42,28 +41,6 @@ fn baselines(found: &IdentificationSummary) -> Vec<(String, bool, &ResidualSumma
         Some((name, is_unseen, residuals, residuals.baseline.as_ref()?))
     };
     unseen.chain(own).filter_map(with_baseline).collect()
-}
-
-/// Returns a sentence for each recording: the model against the constant lag.
-fn comparisons(found: &IdentificationSummary) -> Vec<String> {
-    let unit = crate::DisplayUnit::error(found.kind).symbol;
-    let sentence = |(name, is_unseen, _, baseline): (String, bool, _, &BaselineSummary)| {
-        let use_of =
-            if is_unseen { "not used for the identification" } else { "used for the identification" };
-        let [model, delayed] = [baseline.model, baseline.delayed].map(|rms| digits(rms, 3));
-        let ratio = baseline.delayed / baseline.model;
-        let than = match ratio {
-            ratio if ratio >= 1.05 => format!("{} times as much", digits(ratio, 3)),
-            ratio if ratio > 0.95 => "as much".to_owned(),
-            _ => "less".to_owned(),
-        };
-        format!(
-            "{name} ({use_of}): the position deviates from the model by {model} {unit} RMS, and from PSEC with the best constant \
-             lag ({:.2} ms) by {delayed} {unit} RMS, {than}.",
-            baseline.lag_ms
-        )
-    };
-    baselines(found).into_iter().map(sentence).collect()
 }
 
 /// Lists the residuals of each recording; none without simulation.
@@ -92,5 +69,8 @@ fn table(page: &IdentificationPage) -> Option<Table> {
         ]
     };
     let rows: Vec<Vec<String>> = baselines(found).into_iter().map(row).collect();
-    (!rows.is_empty()).then(|| Table { rows, ..Table::new("Model against constant lag", &columns) })
+    (!rows.is_empty()).then(|| Table {
+        rows,
+        ..Table::new("Deviation of the position: model against constant lag", &columns)
+    })
 }

@@ -1,5 +1,6 @@
 //! Report pages: contents, escaping, decimation, and robustness to invalid values.
 
+use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 use crate::report_common::{
@@ -8,7 +9,8 @@ use crate::report_common::{
 };
 use virtual_axes_core::assess::{AxisTrace, CircleTrace, SignalRecording, ToolTrace};
 use virtual_axes_core::config::AxisKind;
-use virtual_axes_report::{Report, ReportRun, Section, Table, TableColumn};
+use virtual_axes_nc::offline::CycleError;
+use virtual_axes_report::{Report, ReportRun, Section, Table, TableColumn, ToolPath};
 
 static BALLBAR: LazyLock<[SignalRecording; 2]> =
     LazyLock::new(|| [ballbar(&[], POSITION_CYCLE, false), ballbar(&NO_FEEDFORWARD, POSITION_CYCLE, false)]);
@@ -239,9 +241,40 @@ fn the_page_size_of_a_long_run_is_bounded() {
         deviation: noise(LONG, 12),
     };
     recording.circles = vec![circle(true), circle(false)];
-    let page = page("noise", vec![report_run("one", &recording)]);
-    println!("{} bytes for noise in every signal", page.len());
-    assert!(page.len() < MOST_BYTES, "{} bytes", page.len());
+    let plain = page("noise", vec![report_run("one", &recording)]);
+    assert!(plain.len() < MOST_BYTES, "{} bytes", plain.len());
+
+    let program = long_program(LONG, "#<_größe> = [\"text\"] G1 X100.123 Y100.123 (finishing pass)");
+    let run = |title| ReportRun { program: Some(&program), ..report_run(title, &recording) };
+    for runs in [vec![run("cascade")], vec![run("cascade"), run("gpc")]] {
+        let page = page("noise", runs);
+        assert!(page.len() < MOST_BYTES, "{} bytes", page.len());
+        // Each line of a point has a text.
+        let path = figure(&page, "Path of the tool");
+        let lines = path["runs"][0]["lines"].as_array().expect("lines");
+        assert!(lines.len() > 4000 && lines.iter().all(|line| path["texts"][line.to_string()].is_string()));
+    }
+}
+
+/// Returns a path with noise, and one line with a text for each three cycles.
+fn long_program(cycles: usize, text: &str) -> ToolPath {
+    let (x, y) = (noise(cycles, 13), noise(cycles, 14));
+    let mut path = ToolPath::default();
+    for i in 0..cycles {
+        path.add(&CycleError {
+            time: i as f64 * 1e-3,
+            line: 1 + i / 3,
+            tip: [x[i], y[i], x[i] * y[i]],
+            reference: [y[i], x[i], x[i]],
+            contour_error: x[i].abs(),
+            path_position: i as f64 * 1.1e-3,
+            programmed_feed: 0.123_456_7,
+            reached_feed: y[i].abs(),
+            ..CycleError::default()
+        });
+        path.texts.insert(1 + i / 3, text.to_owned());
+    }
+    path
 }
 
 #[test]
@@ -266,7 +299,22 @@ fn runs_share_the_axes_of_their_charts() {
         axis["panels"][0]["series"].as_array().expect("series").iter().map(|s| s["run"].as_u64()).collect();
     assert_eq!(runs, [None, Some(0), Some(1)]);
     assert!(page.contains("<input type=\"checkbox\" checked value=\"1\">"));
-    assert!(page.contains("are stationary (largest following error)."));
+    assert!(page.contains("are stationary; in parentheses: largest following error."));
+}
+
+#[test]
+fn each_entry_of_a_legend_has_a_look_of_its_own() {
+    for page in [page("ballbar", two_runs()), page("ballbar", vec![report_run("cascade", &BALLBAR[0])])] {
+        let axis = figure(&page, "X axis");
+        let panels = axis["panels"].as_array().expect("panels").iter();
+        let series = panels.flat_map(|panel| panel["series"].as_array().expect("series"));
+        let looks: BTreeSet<[String; 2]> =
+            series.map(|s| [s["label"].to_string(), format!("{} {}", s["kind"], s["style"])]).collect();
+        for i in 0..2 {
+            let one: BTreeSet<&str> = looks.iter().map(|pair| pair[i].as_str()).collect();
+            assert_eq!(one.len(), looks.len(), "{looks:?}");
+        }
+    }
 }
 
 #[test]

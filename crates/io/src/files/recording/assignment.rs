@@ -7,7 +7,7 @@ use super::format::Found;
 use super::found_column::{ColumnFactor, FoundColumn};
 use super::unit::Channel;
 use crate::files::error::{ErrorKind, FileError, MAX_LISTED};
-use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
+use virtual_axes_core::text::{is_slip, nearest_hint, nearest_name, shortened};
 use virtual_axes_identify::recording::Finding;
 
 /// Maximum number of names in an error message.
@@ -40,10 +40,34 @@ impl ColumnAssignment {
         self.slots.iter().position(|slot| slot.is_some_and(|(channel, _)| channel == index))
     }
 
+    /// Warns of columns that are not read, whose name is nearly that of a channel without a column.
+    fn report_slips(&self, context: &Context, found: &[FoundColumn], findings: &mut Vec<Finding>) {
+        let absent =
+            Channel::ALL.into_iter().enumerate().filter(|(index, _)| self.column_of(*index).is_none());
+        let absent: Vec<&str> = absent.map(|(_, channel)| channel.name()).collect();
+        for (column, slot) in found.iter().zip(&self.slots) {
+            let is_other = column.axis.as_ref().is_some_and(|axis| !axis.eq_ignore_ascii_case(context.joint));
+            if slot.is_some() || column.channel.is_some() || is_other {
+                continue;
+            }
+            // Without axis and unit: `curent` of `x.curent [A]`.
+            let name = column.header.rsplit('.').next().unwrap_or_default().split(['[', '(']).next();
+            let name = name.unwrap_or_default().trim().to_lowercase();
+            if let Some(near) = nearest_name(&name, absent.iter().filter(|channel| is_slip(&name, channel))) {
+                let header = shortened(&column.header);
+                let what =
+                    format!("{}: column {header} is not read; the nearest channel is {near}", context.name);
+                let remedy = format!("rename it, or select it by --column '{near}={header}'");
+                findings.push(Finding::warning("unread-column", what, remedy));
+            }
+        }
+    }
+
     /// Reports the columns of channels without a mapping: those with default headers beside a mapping, and those with
     /// detected meanings.
     pub fn report(&self, context: &Context, found: &[FoundColumn], findings: &mut Vec<Finding>) {
         findings.extend(self.findings.iter().cloned());
+        self.report_slips(context, found, findings);
         let column = |index: &usize| {
             let channel = Channel::ALL.get(*index)?;
             Some((*channel, found.get(self.column_of(*index)?)?))
