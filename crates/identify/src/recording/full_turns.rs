@@ -36,7 +36,10 @@ pub(super) fn without_resets(
     (resets > 0).then(|| {
         findings.push(Finding::note(
             "modulo",
-            format!("{}: the positions are counted modulo 360°: {resets} jumps by a turn are removed", raw.name),
+            format!(
+                "{}: the positions are counted modulo 360°: {resets} jumps by a turn are removed",
+                raw.name
+            ),
         ));
         unrolled
     })
