@@ -160,10 +160,15 @@ impl<'a> PlausibilityCheck<'a> {
     fn check_velocity_correlation(&self) -> Result<(), ConditioningError> {
         let Some((_, together)) = self.velocity_relation() else { return Ok(()) };
         let Some((recorded, derivative)) = self.recorded.as_ref() else { return Ok(()) };
-        let (low, high) = self
-            .moving_samples()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), n| (l.min(recorded[n]), h.max(recorded[n])));
-        if high - low <= CONSTANT * high.abs().max(low.abs()) {
+        // From the lowest to the highest tenth, without the ends of the motion.
+        let range = |values: &[f64]| -> Option<[f64; 2]> {
+            let mut moving: Vec<f64> = self.moving_samples().map(|n| values[n]).collect();
+            Some([quantile(&mut moving, 0.1)?, quantile(&mut moving, 0.9)?])
+        };
+        if let (Some([low, high]), Some([slow, fast])) = (range(recorded), range(&self.velocity))
+            && high - low <= CONSTANT * high.abs().max(low.abs())
+            && fast - slow > MOVING * self.top_speed
+        {
             let reason = format!("the velocity is constant at {} {}/s in motion", Rounded(low), self.unit());
             return self.error(reason, "the column is likely a setpoint: name another one, or rename it");
         }
