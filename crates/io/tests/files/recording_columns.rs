@@ -160,7 +160,7 @@ fn headers_name_channel_unit_and_axis() {
         ("velocity setpoint [mm/s]", "-"),
         ("current_setpoint", "-"),
         ("motor speed [rpm]", "-"),
-        ("torque", "-"),
+        ("drive torque", "-"),
         ("x", "- x"),
         ("v", "- v"),
         ("x_ref_limit", "- x"),
