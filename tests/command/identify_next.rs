@@ -228,6 +228,23 @@ fn axes_without_the_letter_of_an_axis_are_named() {
 }
 
 #[test]
+fn all_axes_of_a_file_that_names_none_are_rejected_with_the_remedy() {
+    let folder = TestFolder::new("identify_no_name");
+    for (text, reason) in [
+        (
+            "time,psec,position,current\n0,1,1,2\n",
+            "the columns name no axis; give its name, for example --axis x",
+        ),
+        ("1.5,0.3,2\n1.6,0.4,2\n", "no column is recognized as a position; list the columns without --axis"),
+    ] {
+        let trace = folder.file("trace.csv", text).to_string_lossy().into_owned();
+        for new in [&["--new-machine", "New"][..], &[]] {
+            assert_rejected(&[&["identify", &trace, "--axis", "all"], new].concat(), &[reason]);
+        }
+    }
+}
+
+#[test]
 fn plausibility_is_measured_against_stated_values() {
     let folder = TestFolder::new("identify_stated");
     let trace = folder.file(

@@ -86,6 +86,11 @@ impl LawFit {
         LawFit { law, config, errors, r_squared, covariance }
     }
 
+    /// Returns the law with the standard errors and the covariance of `other`.
+    pub(super) fn with_errors_of(self, other: &LawFit) -> Self {
+        LawFit { errors: other.errors, covariance: other.covariance.clone(), ..self }
+    }
+
     /// Returns the friction current at V (m/min or rev/min), A, with the sign of V.
     pub fn at(&self, v: f64) -> f64 {
         friction_current(&self.config, v)

@@ -33,6 +33,8 @@ const BANDWIDTH_STARTS: [f64; 2] = [180.0, 300.0];
 const KEPT: f64 = 1.1;
 /// The same for the cycle at which the signals are renewed.
 const RENEWED: f64 = 1.5;
+/// Residual relative to the least one up to which a position cycle is possible.
+const ADMISSIBLE: f64 = 1.5;
 /// Starts of each gain that are followed to their minimum.
 const FOLLOWED: usize = 1;
 /// Gains whose minimum is followed with a free gain; the best one can be a local minimum.
@@ -78,6 +80,8 @@ pub(super) struct LoopFit {
     pub rms_with_given_gain: Option<f64>,
     /// VFFW and lag (s) at both ends of the valley in which the residual hardly changes.
     pub valley: Option<[(f64, f64); 2]>,
+    /// Axis, periods and shift of the commanded position, s, with other position cycles that explain the motion alike.
+    pub other_cycles: Vec<(AxisConfig, Periods, f64)>,
 }
 
 /// Recordings and options of the fit.
@@ -371,13 +375,19 @@ impl LoopProblem<'_> {
         // Long recordings are searched in part only.
         let search = LoopProblem { duration: SEARCHED, ..*self };
         let first = search.best(axis, start, &parameters, lag)?;
-        let (periods, free) = search.best_cycle((axis, given), &cycles, &parameters, first);
+        let (periods, free, others) = search.best_cycle((axis, given), &cycles, &parameters, first);
         let free = search.polish(axis, &periods, &parameters, free);
         // A residual below that of usual encoders outweighs the prior.
         let noise = self.correlated_noise(axis, &periods, &parameters, &free.values)?;
         let problem = LoopProblem { noise: noise.min(self.noise), ..*self };
         let free = problem.converge(axis, &periods, &parameters, &free.values)?;
-        problem.finish((axis, &periods), parameters, free)
+        let other_cycles = others.into_iter().map(|(periods, found)| {
+            let (axis, shift) = apply(axis, &periods, &parameters, &found.values);
+            (axis, periods, shift)
+        });
+        let other_cycles = other_cycles.collect();
+        let fit = problem.finish((axis, &periods), parameters.clone(), free)?;
+        Some(LoopFit { other_cycles, ..fit })
     }
 
     /// Rounds the minimum `free` to the delays that a machine file can have, and determines its errors.
@@ -398,16 +408,25 @@ impl LoopProblem<'_> {
         // The delay of the machine file is a whole number of position cycles.
         let tsp = seconds(periods.position);
         let cycles = (free.values[0] / tsp).round().max(0.0);
-        let mut between = axis.clone();
-        if !divides(periods.position, free.values[0]) && self.has_velocity_feedforward(axis) {
+        let others = &parameters[1..];
+        let rounded = |axis: &AxisConfig| {
+            let (fixed, _) = apply(axis, periods, &[LoopParameter::Lag], &[cycles * tsp]);
+            let last = self.converge(&fixed, periods, others, &free.values[1..])?;
+            Some((fixed, last))
+        };
+        let exact = rounded(axis)?;
+        // A small part of a cycle is many encoder increments at high speed.
+        let is_rest = !divides(periods.position, free.values[0]) || exact.1.cost > KEPT * KEPT * free.cost;
+        let between = (is_rest && self.has_velocity_feedforward(axis)).then(|| {
             // The lag is α + (1 − VFFW) / Kp: VFFW represents what is left of it between two cycles.
             let gain = parameters.iter().zip(&free.values).find(|(p, _)| **p == LoopParameter::Gain);
             let gain = gain.map_or(self.given_gain, |(_, value)| *value);
+            let mut between = axis.clone();
             between.feedforward.velocity -= (free.values[0] - cycles * tsp) * gain;
-        }
-        let (fixed, _) = apply(&between, periods, &[LoopParameter::Lag], &[cycles * tsp]);
-        let others = &parameters[1..];
-        let last = self.converge(&fixed, periods, others, &free.values[1..])?;
+            between
+        });
+        let between = between.as_ref().and_then(rounded);
+        let (fixed, last) = between.filter(|(_, last)| last.cost < exact.1.cost).unwrap_or(exact);
         let (found, _) = apply(&fixed, periods, others, &last.values);
         let covariance = self.covariance(axis, periods, &parameters, &free.values)?;
         let errors = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
@@ -426,6 +445,7 @@ impl LoopProblem<'_> {
             rms: (last.cost / count).sqrt(),
             rms_with_given_gain: rms_with_given_gain.map(|cost| (cost / count).sqrt()),
             valley: self.valley(&found, periods, free.values[0]),
+            other_cycles: Vec::new(),
             axis: found,
             periods: *periods,
         })
@@ -448,7 +468,8 @@ impl LoopProblem<'_> {
         Some(fit)
     }
 
-    /// Returns the position cycle with the least residual and its minimum. Among cycles with about the same residual, the
+    /// Returns the position cycle with the least residual and its minimum, and those of the other cycles that the recordings
+    /// do not exclude. Among cycles with about the same residual, the
     /// renewal of the signals is preferred, then that of the machine file if it divides the lag, then the first one.
     ///
     /// A motion shows β + Tsp, so the others start with β changed by the difference of the cycles.
@@ -458,8 +479,8 @@ impl LoopProblem<'_> {
         cycles: &[Periods],
         parameters: &[LoopParameter],
         first: Candidate,
-    ) -> (Periods, Candidate) {
-        let Some(start) = cycles.first() else { return (*given, first) };
+    ) -> (Periods, Candidate, Vec<(Periods, Candidate)>) {
+        let Some(start) = cycles.first() else { return (*given, first, Vec::new()) };
         let others = cycles.iter().skip(1).filter_map(|periods| {
             let change = seconds(start.position) - seconds(periods.position);
             let from = parameters.iter().zip(&first.values).map(|(parameter, value)| match parameter {
@@ -474,8 +495,8 @@ impl LoopProblem<'_> {
         let least = all.iter().map(|(_, found)| found.cost).fold(f64::INFINITY, f64::min);
         let renewal = self.renewal(given);
         let limit = |periods: &Periods| if Some(periods.position) == renewal { RENEWED } else { KEPT };
-        let close = all.into_iter().filter(|(periods, found)| found.cost <= limit(periods).powi(2) * least);
-        let preference = |(periods, found): &(Periods, Candidate)| {
+        let close = all.iter().filter(|(periods, found)| found.cost <= limit(periods).powi(2) * least);
+        let preference = |(periods, found): &&(Periods, Candidate)| {
             let cycle = periods.position;
             let is_dividing = divides(cycle, found.values[0]);
             (
@@ -486,7 +507,12 @@ impl LoopProblem<'_> {
                 cycle,
             )
         };
-        close.max_by_key(preference).unwrap_or((*start, first))
+        let (periods, found) = close.max_by_key(preference).cloned().unwrap_or((*start, first));
+        let is_other = |(other, minimum): &(Periods, Candidate)| {
+            other.position != periods.position && minimum.cost <= ADMISSIBLE * ADMISSIBLE * least
+        };
+        all.retain(is_other);
+        (periods, found, all)
     }
 
     /// Returns the minimum with the gain of the machine file, and its parameters; none if the gain is not fitted.

@@ -346,6 +346,12 @@ pub(super) fn fit_plant(
         return Some(free);
     }
     let mut fixed = fit_plant_by_regression(&recordings, axis, ripple.as_ref(), false)?;
+    if axis.kind() == AxisKind::Linear {
+        // The weight that is set to zero is as uncertain as before, and with it what the motion does not separate from it.
+        fixed.friction.law = fixed.friction.law.with_errors_of(&free.friction.law);
+        fixed.inertia.error = free.inertia.error.max(fixed.inertia.error);
+        fixed.collinear = free.collinear;
+    }
     fixed.gravity = GravityFit { model: GravityCurrent::default(), ..free.gravity };
     Some(fixed)
 }

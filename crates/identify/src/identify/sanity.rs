@@ -85,16 +85,20 @@ pub(super) fn report_unstated(stated: StatedValues, found: &mut Identification) 
         assumed.push(format!("{name} constant of {} {unit}", Rounded(axis.motor.torque_constant)));
     }
     let has_results = found.friction.is_some() || found.feedforward.velocity.is_some();
-    if !stated.transmission && has_results && is_linear && !is_linear_motor {
-        assumed.push(format!("screw lead of {} mm", Rounded(ratio * REVOLUTION / MILLIMETER)));
+    if !stated.transmission && has_results && !is_linear_motor {
+        assumed.push(match axis.kind() {
+            AxisKind::Linear => format!("screw lead of {} mm", Rounded(ratio * REVOLUTION / MILLIMETER)),
+            AxisKind::Rotary => format!("gear ratio of {}", Rounded(1.0 / ratio)),
+        });
     }
     if assumed.is_empty() {
         return;
     }
+    let weight = if is_linear { "weight, " } else { "" };
     found.findings.push(Finding::warning(
         "unstated-scale",
         format!(
-            "the {} of the initial machine {} assumed: inertia, weight, gain of the velocity loop and weights of a feedforward \
+            "the {} of the initial machine {} assumed: inertia, {weight}gain of the velocity loop and weights of a feedforward \
              recorded at the motor depend on {}",
             assumed.join(" and the "),
             if assumed.len() > 1 { "are" } else { "is" },
@@ -126,7 +130,7 @@ pub fn invalid_agreement(name: &str, agreement: &Agreement, axis: &AxisConfig) -
         let mut finding = Finding::invalid(
             POOR_CURRENT,
             format!("{name}: the model explains {} of the current", explained(r2)),
-            "check units, torque constant and transmission; record without cutting forces",
+            "check that the current is that of this axis, with its sign and without a filter; record without cutting forces",
         );
         if axis.presliding.is_some() || axis.transmission.is_some() {
             // The inverse dynamics are those of a rigid axis without presliding.

@@ -3,6 +3,7 @@
 use super::current_lag::{self, HIGHEST_LAG, LOWEST_LAG};
 use super::filter::{GaussianFilter, MAX_CUTOFF_PERIOD, default_cutoff, deviation};
 use super::filtered_section::FilteredSection;
+use super::full_turns::without_resets;
 use super::held_samples::without_held_samples;
 use super::ordering::{drop_copies, sort_samples};
 use super::spans::{
@@ -86,6 +87,8 @@ pub fn condition(
 ) -> Result<(Signals, Vec<Finding>), ConditioningError> {
     let mut findings = Vec::new();
     check_lengths(raw)?;
+    let unrolled = without_resets(raw, axis, &mut findings);
+    let raw = unrolled.as_ref().unwrap_or(raw);
     let renewed = without_held_samples(raw, &mut findings);
     let raw = renewed.as_ref().unwrap_or(raw);
     let mut ordered = sort_samples(raw, &mut findings)?;

@@ -10,6 +10,7 @@ mod error;
 mod filter;
 mod filtered_section;
 mod finding;
+mod full_turns;
 mod held_samples;
 mod ordering;
 mod plausibility;

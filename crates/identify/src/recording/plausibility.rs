@@ -33,6 +33,8 @@ const MOVING: f64 = 0.1;
 const TOGETHER: f64 = 0.7;
 /// Correlation above which two columns contain the same signal.
 const SAME: f64 = 0.9995;
+/// Change of a velocity in motion, relative to its value, up to which it is constant.
+const CONSTANT: f64 = 1e-6;
 /// Scale factors treated as 1; filters and following error change amplitudes.
 const UNITY: std::ops::Range<f64> = 0.75..1.35;
 /// Relative tolerance of a scale factor between two units.
@@ -158,6 +160,18 @@ impl<'a> PlausibilityCheck<'a> {
     fn check_velocity_correlation(&self) -> Result<(), ConditioningError> {
         let Some((_, together)) = self.velocity_relation() else { return Ok(()) };
         let Some((recorded, derivative)) = self.recorded.as_ref() else { return Ok(()) };
+        // From the lowest to the highest tenth, without the ends of the motion.
+        let range = |values: &[f64]| -> Option<[f64; 2]> {
+            let mut moving: Vec<f64> = self.moving_samples().map(|n| values[n]).collect();
+            Some([quantile(&mut moving, 0.1)?, quantile(&mut moving, 0.9)?])
+        };
+        if let (Some([low, high]), Some([slow, fast])) = (range(recorded), range(&self.velocity))
+            && high - low <= CONSTANT * high.abs().max(low.abs())
+            && fast - slow > MOVING * self.top_speed
+        {
+            let reason = format!("the velocity is constant at {} {}/s in motion", Rounded(low), self.unit());
+            return self.error(reason, "the column is likely a setpoint: name another one, or rename it");
+        }
         let position = self.column(POSITION);
         let looks_like = if correlation(recorded, position).abs() > SAME {
             "the velocity column contains a position"
@@ -211,7 +225,9 @@ impl<'a> PlausibilityCheck<'a> {
             let looks_like = if fits {
                 format!("it is likely in {large}; give --column {key}=COLUMN[{large}]")
             } else {
-                String::new()
+                format!(
+                    "check its unit; give it by --column '{key}=COLUMN[UNIT]', for example with a factor: [0.001 {large}]"
+                )
             };
             let (unit, travel, range) = (self.unit(), Rounded(travel), Rounded(range));
             let limit = if self.stated.travel {

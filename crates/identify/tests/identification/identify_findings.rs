@@ -2,6 +2,7 @@
 //! from other data where possible.
 
 use virtual_axes_core::config::{Parameters, Value, ValueSource};
+use virtual_axes_core::units::Rounded;
 use virtual_axes_identify::identify::campaign::{Campaign, CampaignOptions as Limits};
 use virtual_axes_identify::identify::{
     Breakaway, FeedforwardMode, FrictionLaw, Identification, IdentificationInput, IdentificationOptions,
@@ -153,6 +154,18 @@ fn speeds_in_one_direction_are_reported() {
 }
 
 #[test]
+fn a_weight_that_one_direction_hides_is_in_the_interval_of_the_friction() {
+    let heavy = with(true_parameters(), "x.gravity.weight_n", Value::Double(1500.0));
+    let raw = recorded(&heavy, &legs(&[6.0], false), &clean());
+    let found = identified(&[raw], &initial_parameters("x"), &STEPS_ONLY);
+    let gravity = found.gravity.expect("a gravity");
+    assert_eq!(gravity.model.constant, 0.0, "the weight is not significant");
+    let friction = found.friction.expect("a law").law;
+    let (value, error) = (friction.at(6.0), friction.error_at(6.0));
+    assert!((value - law(6.0)).abs() <= 2.0 * error, "{value} ± {error} A, true {} A", law(6.0));
+}
+
+#[test]
 fn one_direction_without_current_is_not_reported() {
     let mut raw = recorded(&true_parameters(), &legs(&[2.0, 6.0], false), &clean());
     raw.current = None;
@@ -204,6 +217,25 @@ fn torque_constant_and_lead_that_nobody_stated_are_reported() {
     let (constant, lead) = (value("x.motor.torque_constant_nm_a"), value("x.transmission.screw_lead_mm"));
     let expected = format!("the torque constant of {constant} N·m/A and the screw lead of {lead} mm");
     assert!(text.starts_with(&expected), "{text}");
+}
+
+#[test]
+fn the_gear_ratio_that_nobody_stated_is_reported() {
+    let sine: Vec<f64> = (0..800).map(|k| 0.5 * (1.0 - (k as f64 * TSP * 3.0).cos())).collect();
+    let machine = machine_with_feedforward(&true_parameters(), "c", FeedforwardMode::Off);
+    let raw = record(&machine, "c", &sine, &clean());
+    let axis = &machine.axes()[axis_index(&machine, "c")];
+    let signals = condition(&raw, axis, &machine.periods(), &Conditioning::default()).expect("plausible").0;
+    let input = IdentificationInput { signals: &signals, feedforward: Some(FeedforwardMode::Off) };
+    let stated = StatedValues { torque_constant: false, transmission: false, ..StatedValues::ALL };
+    let options = IdentificationOptions { stated, ..STEPS_ONLY };
+    let found = identify(&[input], axis, &machine.periods(), &options);
+    let text = finding(&found, Severity::Warning, "unstated-scale");
+    let ratio =
+        format!("and the gear ratio of {} of the initial machine", Rounded(1.0 / axis.transmission_ratio));
+    assert!(text.contains(&ratio) && !text.contains("weight, "), "{text}");
+    // A constant current is no gravity of a rotary axis.
+    assert!(found.gravity.is_none(), "{:?}", found.gravity);
 }
 
 #[test]

@@ -418,6 +418,59 @@ fn duplicate_rows_are_dropped_in_any_number() {
 }
 
 #[test]
+fn positions_modulo_360_degrees_are_continuous() {
+    let raw = recording();
+    let offset = TAU - 0.1;
+    let modulo = |channel: &Option<Vec<f64>>, offset: f64| -> Option<Vec<f64>> {
+        Some(channel.as_ref()?.iter().map(|value| (value + offset).rem_euclid(TAU)).collect())
+    };
+    let turning = RawRecording {
+        psec: modulo(&raw.psec, offset),
+        position: modulo(&raw.position, offset),
+        current: None,
+        ..raw.clone()
+    };
+    let options = Conditioning::default();
+    let (signals, findings) =
+        condition(&turning, &axis("c"), &machine().periods(), &options).expect("the recording is good");
+    assert!(codes(&findings).contains(&"modulo"), "{findings:?}");
+    let [span] = signals.spans.as_slice() else { panic!("{} spans", signals.spans.len()) };
+    let psec = span.psec.as_ref().expect("recorded");
+    for (n, (position, psec)) in span.position.iter().zip(psec).enumerate() {
+        let t = span.start + n as f64 * PERIOD;
+        assert!((position - offset - motion(t - 0.009)[0]).abs() <= 1e-6, "{t} s: {position} rad");
+        assert!((psec - offset - motion(t)[0]).abs() <= 1e-9, "{t} s: {psec} rad");
+    }
+    // A setpoint on the other side of 0° at the start is no offset of a turn.
+    let apart =
+        RawRecording { psec: modulo(&raw.psec, TAU - 1e-4), position: modulo(&raw.position, 0.0), ..turning };
+    let (signals, _) =
+        condition(&apart, &axis("c"), &machine().periods(), &options).expect("the recording is good");
+    let first = &signals.spans[0];
+    let error = first.psec.as_ref().expect("recorded")[0] - first.position[0];
+    assert!(error.abs() < 1e-3, "{error} rad");
+}
+
+#[test]
+fn a_constant_velocity_column_is_no_factor() {
+    let mut raw = recording();
+    raw.velocity.iter_mut().flatten().for_each(|velocity| *velocity = -0.018);
+    assert_rejected(&raw, "the velocity is constant at -0.018 m/s in motion; ");
+}
+
+#[test]
+fn positions_in_an_unknown_unit_have_a_remedy() {
+    let mut raw = recording();
+    scale(&mut raw.position, 1e7);
+    scale(&mut raw.psec, 1e7);
+    raw.velocity = None;
+    assert_rejected(
+        &raw,
+        "check its unit; give it by --column 'position=COLUMN[UNIT]', for example with a factor: [0.001 mm]",
+    );
+}
+
+#[test]
 fn two_runs_in_one_file_are_two_spans() {
     let mut raw = recording();
     let half: Vec<f64> = raw.time[..SAMPLES / 2].to_vec();

@@ -115,9 +115,12 @@ fn headers_name_channel_unit_and_axis() {
         ("Zeit [ms]", "time [ms]"),
         ("t", "time [s (assumed)]"),
         ("timestamp", "time [s (assumed)]"),
+        ("%time", "time [s (assumed)]"),
         ("sample", "time [samples]"),
         ("Sample number", "time [samples]"),
         ("CYCLE", "time [samples]"),
+        ("/joint_states/shoulder_pan_joint/position", "position [m or rad (assumed)]"),
+        ("torque", "torque [N.m (assumed)]"),
         ("Sollposition [mm]", "psec [mm]"),
         ("Istposition X [mm]", "position [mm] x"),
         ("Lagesollwert C [°]", "psec [deg] c"),
@@ -157,7 +160,7 @@ fn headers_name_channel_unit_and_axis() {
         ("velocity setpoint [mm/s]", "-"),
         ("current_setpoint", "-"),
         ("motor speed [rpm]", "-"),
-        ("torque", "-"),
+        ("drive torque", "-"),
         ("x", "- x"),
         ("v", "- v"),
         ("x_ref_limit", "- x"),
@@ -284,6 +287,20 @@ fn several_fitting_columns_are_an_error() {
     let text = "time,position,Position [mm],torque [Nm],current\n0,1,2,3,4\n";
     let found = Recorded::new("several", text).good("x");
     assert_eq!((found.position, found.current), (Some(vec![1.0]), Some(vec![4.0])));
+}
+
+#[test]
+fn the_list_says_why_a_torque_without_newton_meters_is_not_read() {
+    let found = Recorded::new("torque", "time,position,Torque X [%],Torque Y\n0,1,2,3\n").inspect();
+    let reasons: Vec<&str> = found.columns[2..].iter().map(|column| column.reason.as_str()).collect();
+    assert!(reasons[0].contains("a torque in the unknown unit %"), "{reasons:?}");
+    assert!(reasons[1].contains("a torque without unit"), "{reasons:?}");
+}
+
+#[test]
+fn dates_are_no_times() {
+    let message = Recorded::new("dates", "Time,position\n2024-05-01 12:00:00.002,1\n").error("x");
+    assert!(message.contains("convert dates and times of day to seconds"), "{message}");
 }
 
 #[test]

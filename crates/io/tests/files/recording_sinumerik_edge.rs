@@ -1,6 +1,7 @@
 //! Recordings of Sinumerik Edge.
 
 use super::recording_columns::{Recorded, axis, summary};
+use virtual_axes_identify::recording::Severity;
 use virtual_axes_io::files::RecordingFormat;
 
 /// Excerpt of `example/example_data_ff429d74-6482-4d4f-80e1-31419d9bd56c.json` of
@@ -181,6 +182,11 @@ fn a_mapping_and_a_sampling_rate_take_precedence() {
     let mapped = Recorded::new("edge", EXCERPT).columns(&["position=DES_POS|2[mm]", "psec=ENC_POS|2[mm]"]);
     assert_close(&mapped.good("y").position.expect("there")[..1], &[0.451439545]);
     assert_close(&Recorded::new("edge", EXCERPT).rate(1000.0).good("y").time[..2], &[0.0, 0.001]);
+    let warned = |rate: f64| {
+        let (_, findings) = Recorded::new("edge", EXCERPT).rate(rate).read("y").expect("good");
+        findings.iter().any(|finding| finding.code == "rate-differs" && finding.severity == Severity::Warning)
+    };
+    assert!(warned(1000.0) && !warned(500.0));
     let without_period = EXCERPT.replace("\"CycleTimeMs\" : 2,", "");
     let error = Recorded::new("edge", &without_period).error("y");
     assert!(

@@ -35,7 +35,8 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
     section.paragraphs.push(sentence);
     section.paragraphs.push(match (inertia.is_regression(), found.replayed_inertia) {
         (true, _) => "The current of all samples in motion is fitted by Jeq a / (Kt r), friction and gravity together; the \
-                      standard error counts moves, not samples.",
+                      standard error counts neighboring samples as far as they are independent, and many moves instead of samples \
+                      where that is larger.",
         (false, None) => "Prévost eq. 5 is Jeq = (Kt i − C_friction − C_gravity) / (dω/dt); the value is the mean without outliers.",
         (false, Some(_)) => "Prévost eq. 5 is Jeq = (Kt i − C_friction − C_gravity) / (dω/dt); the value is the mean without \
                              outliers. Eq. 5 on the simulated axis, sampled like the recordings, shows the error of the method, \

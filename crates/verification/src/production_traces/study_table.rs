@@ -13,9 +13,9 @@ use super::trace_kind::TraceProgram;
 /// Kt / Jeq 3 %, lag one cycle, β 1.5 ms, weight 3 % or within its interval, unseen program 5 µm RMS.
 pub fn study_table(figures: &[StudyFigures]) -> String {
     let mut text = String::from(
-        "errors: median, 90 %, largest; coverage of the 95 % intervals in %\n\
-         period  traces  failed  invalid  Kt/Jeq %                weight %                lag cycles      beta ms                 \
-         unseen um\n",
+        "errors: median, 90 %, largest; coverage of the 95 % intervals in %, median of their half widths\n\
+         period  traces  failed  invalid  Kt/Jeq %                      weight %                      lag cycles            \
+         beta ms                       unseen um\n",
     );
     let mut periods: Vec<Nanoseconds> = figures.iter().map(|figure| figure.period).collect();
     periods.sort_unstable();
@@ -52,7 +52,9 @@ fn line(name: &str, of: &[&StudyFigures]) -> String {
         let found: Vec<ValueError> = of.iter().filter_map(|figure| value(figure)).collect();
         let covered = found.iter().filter(|value| value.is_covered).count();
         let share = 100.0 * covered as f64 / found.len().max(1) as f64;
-        format!("{} {share:3.0}", spread(found.iter().map(|value| value.error * scale)))
+        let mut halves: Vec<f64> = found.iter().map(|value| (value.half_interval * scale).abs()).collect();
+        let half = quantile(&mut halves, 0.5).unwrap_or(f64::NAN);
+        format!("{} {share:3.0} {half:5.2}", spread(found.iter().map(|value| value.error * scale)))
     };
     let failed = of.iter().filter(|figure| figure.failure.is_some()).count();
     let invalid = of.iter().filter(|figure| !figure.invalid.is_empty()).count();

@@ -212,6 +212,24 @@ fn a_lag_between_two_position_cycles_is_represented() {
 }
 
 #[test]
+fn a_position_that_is_logged_after_the_setpoint_is_represented() {
+    // The encoder is read 0.12 ms behind the stamp: less than a position cycle, but 30 µm at 15 m/min.
+    let axis = HiddenAxis::draw(6002, AxisOrientation::Horizontal);
+    let guess = axis.guess(6002);
+    let recorder = TraceRecorder { period: 2_000_000, cutoff: 0.0, ..TraceRecorder::ideal() };
+    let raw = recorded(&axis, &recorder, 1);
+    let position = raw.position.as_ref().expect("recorded");
+    let next = position.iter().skip(1).chain(position.last());
+    let later: Vec<f64> = position.iter().zip(next).map(|(a, b)| a + 0.06 * (b - a)).collect();
+    let raw = RawRecording { position: Some(later), velocity: None, ..raw };
+    let signals = conditioned(&raw, &guess, &Conditioning::default());
+    let found = identified(&signals, &guess, RefinementScope::ALL);
+    assert!(residual(&found) <= 3e-6, "{} m", residual(&found));
+    let gain = found.axis().position_loop.gain / axis.config.position_loop.gain;
+    assert!((gain - 1.0).abs() <= 0.03, "{gain}");
+}
+
+#[test]
 fn a_position_cycle_that_is_longer_than_the_motion_allows_is_replaced() {
     // β + Tsp of the hidden axis is less than the position cycle of the machine file, which divides the lag.
     let millisecond = 1_000_000;

@@ -11,7 +11,7 @@ use virtual_axes_report::Table;
 
 use crate::identify::next_command::Listed;
 use crate::identify::recordings::RecordingArguments;
-use crate::identify::selection::SelectedAxis;
+use crate::identify::selection::{SelectedAxis, without_axis};
 use crate::output::text_table;
 
 /// Returns the columns of the recordings, what they are taken for, what is missing, and the next command; those of
@@ -36,7 +36,7 @@ pub fn listing(
         text += &text_table::aligned(&table(&found), &[0, 1, 2, 3, 4]);
         text.push('\n');
         let needed = if transmission.contains(path) { &BOTH_ENCODERS[..] } else { &ONE_ENCODER[..] };
-        for line in missing(&found, needed) {
+        for line in missing(&found, needed, reading.has_rate()) {
             text += &text_table::wrapped_line(&line);
         }
         axes.extend(axes_of(&found, config));
@@ -84,6 +84,9 @@ pub fn recorded_axes(
             .into());
         }
         let axes = axes_of(&found, config);
+        if axes.is_empty() && found.readable_axes().is_empty() {
+            return Err(without_axis(&path.display().to_string(), &found).into());
+        }
         if axes.is_empty() {
             let known: Vec<&str> = config.axes().iter().map(|axis| axis.name()).collect();
             let present = found.readable_axes().join(", ");
@@ -146,14 +149,14 @@ const BOTH_ENCODERS: [NeededChannel; 3] = [
     ),
 ];
 
-/// Returns what a recording lacks, one line each.
-fn missing(found: &RecordingColumns, needed: &[NeededChannel]) -> Vec<String> {
+/// Returns what a recording lacks, one line each; `has_rate` if a sampling rate is given.
+fn missing(found: &RecordingColumns, needed: &[NeededChannel], has_rate: bool) -> Vec<String> {
     let has = |channel: Channel| found.columns.iter().any(|column| column.channel == Some(channel));
     let mut lines = Vec::new();
     if found.format == RecordingFormat::Mcap {
         return vec!["the messages are read with the name of the axis".to_owned()];
     }
-    if !found.has_time() {
+    if !found.has_time() && !has_rate {
         lines.push("missing: time; give the sampling rate with --rate-hz".to_owned());
     }
     for (channels, name, effect) in needed {

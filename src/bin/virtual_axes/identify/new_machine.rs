@@ -114,7 +114,9 @@ pub fn parameters(
         values.extend(of_axis.map(|(key, value)| (format!("{}.{key}", axis.name()), value)));
     }
     let values = assignments(&parameters, values.into_iter(), &ValueSource::named(RECORDINGS));
-    parameters.set_all(values)?;
+    parameters.set_all(values).map_err(|error| {
+        format!("{error}; the positions of a recording jump: check their unit, and remove jumps and resets of the position")
+    })?;
     // Gains of the velocity loop are in proportion to the inertia, which the current alone shows.
     let config: MachineConfig = parameters.machine_config()?;
     for (axis, signals) in config.axes().iter().zip(&seen) {
@@ -221,8 +223,10 @@ fn recorded_values(axis: &AxisConfig, recordings: &[Signals]) -> Vec<(&'static s
         ],
     };
     values.push(("motor.max_speed_rpm", rounded_up(motor_speed / RPM)));
-    let emf = axis.motor.emf_constant.min(EMF_SHARE * axis.motor.max_voltage / motor_speed);
-    values.push(("motor.emf_constant_v_s_rad", emf));
+    let emf = EMF_SHARE * axis.motor.max_voltage / motor_speed;
+    if emf < axis.motor.emf_constant {
+        values.push(("motor.emf_constant_v_s_rad", emf));
+    }
     if current > 0.0 {
         values.push(("motor.max_current_a", rounded_up(RESERVE * current)));
     }

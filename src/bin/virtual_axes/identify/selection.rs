@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use virtual_axes_core::text::shortened;
 use virtual_axes_identify::recording::Finding;
-use virtual_axes_io::files::{RecordingFormat, inspect_recording};
+use virtual_axes_io::files::{Channel, RecordingColumns, RecordingFormat, inspect_recording};
 
 use crate::identify::recordings::RecordingArguments;
 
@@ -79,8 +79,13 @@ pub fn recorded_axes(
             LETTERS.iter().filter(is_readable).map(|letter| select(letter, None)).collect();
         if axes.is_empty() {
             let numbered = LETTERS.iter().zip(["1", "2", "3"]);
-            let present = numbered.filter(|(_, number)| readable.iter().any(|known| known == number));
-            axes.extend(present.map(|(letter, number)| select(letter, Some(number.to_owned()))));
+            axes.extend(numbered.filter_map(|(letter, number)| {
+                let name = readable.iter().find(|known| known.trim_start_matches('0') == number)?;
+                Some(select(letter, Some(name.clone())))
+            }));
+        }
+        if axes.is_empty() && readable.is_empty() {
+            return Err(without_axis(&file.to_string(), &found).into());
         }
         if axes.is_empty() {
             return Err(format!(
@@ -96,6 +101,19 @@ pub fn recorded_axes(
         });
     }
     Ok(common.unwrap_or_default())
+}
+
+/// Returns the error of `--axis all` about a file whose columns name no axis with a position.
+pub fn without_axis(file: &str, found: &RecordingColumns) -> String {
+    let has_position = found.columns.iter().any(|column| column.channel == Some(Channel::Position));
+    let reason = match has_position {
+        true => "the columns name no axis; give its name, for example --axis x",
+        false => {
+            "no column is recognized as a position; list the columns without --axis, and select them by --column with the name of \
+             the axis, for example --axis x --column 'position=#2[mm]'"
+        }
+    };
+    format!("{file}: --axis all: {reason}")
 }
 
 /// Returns the finding about axes of the recordings whose names `--axis all` does not know as those of `axes`.

@@ -383,9 +383,13 @@ impl<'a> Selector<'a> {
                     _ => format!("has the {}", unit.to_string().replacen("unknown:", "unknown unit", 1)),
                 };
                 let allowed: Vec<&str> = channel.units(context.axis).iter().map(|(s, _)| *s).collect();
+                let example = match allowed.contains(&"mm") {
+                    true => "25.4 mm".to_owned(),
+                    false => format!("0.5 {}", allowed.first().unwrap_or(&"")),
+                };
                 let reason = format!(
                     "{channel} from column {} {found}, must be in one of {}; give the unit by --column \
-                     '{channel}=COLUMN[UNIT]', for example with a factor: [25.4 mm]",
+                     '{channel}=COLUMN[UNIT]', for example with a factor: [{example}]",
                     shortened(&column.header),
                     allowed.join(", ")
                 );

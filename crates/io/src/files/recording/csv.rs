@@ -162,7 +162,11 @@ impl Layout {
             return Err(FileError::fields(at(), found, wanted, hint));
         }
         if let Some((column, index, field)) = wrong {
+            let is_date = index == 0 && field.matches([':', '-', 'T']).count() > 1;
             let hint = match self.decimal_comma {
+                _ if is_date => {
+                    "; convert dates and times of day to seconds, or delete the column and give the sampling rate by --rate-hz"
+                }
                 false if field.contains(',') && parse_number(field, true).is_some() => {
                     "; set --column decimal_comma=true for decimal commas"
                 }

@@ -66,6 +66,14 @@ pub(super) fn detect(number: usize, header: &str) -> FoundColumn {
     if header.contains(['{', '}']) {
         return FoundColumn::unknown(number, header, "no known word");
     }
+    if header == Channel::Torque.name() {
+        let unit = Some(ColumnUnit(UnitSource::Assumed(Channel::Torque)));
+        return FoundColumn {
+            channel: Some(Channel::Torque),
+            unit,
+            ..FoundColumn::unknown(number, header, "the usual header of the torque beside the current")
+        };
+    }
     let (rest, mut unit) = split_brackets(header);
     let mut pieces: Vec<&str> =
         rest.split(|c: char| !c.is_alphanumeric()).filter(|p| !p.is_empty()).collect();
@@ -266,7 +274,12 @@ impl Facts {
             HeaderQuantity::Current => Ok(Channel::Current),
             HeaderQuantity::Torque => match unit {
                 HeaderUnit::Known(_) => Ok(Channel::Current),
-                _ => Err(format!(
+                HeaderUnit::Unknown(unit) => Err(format!(
+                    "{}: a torque in the unknown unit {unit}; map it by --column 'current=COLUMN[UNIT]' with a factor, for example \
+                     [0.1 N.m]",
+                    self.quoted()
+                )),
+                HeaderUnit::Missing => Err(format!(
                     "{}: a torque without unit; map it by --column 'current=COLUMN[N.m]'",
                     self.quoted()
                 )),

@@ -19,7 +19,8 @@ pub(super) enum HeaderUnit {
 
 /// Splits the unit off: text in brackets, or after ` / ` or ` in `. Other text in brackets stays.
 pub(super) fn split_brackets(header: &str) -> (String, HeaderUnit) {
-    let mut rest = header.trim().to_owned();
+    // A comment sign marks the header of some programs: `%time`.
+    let mut rest = header.trim().trim_start_matches(['%', '#']).to_owned();
     let mut unit = HeaderUnit::Missing;
     for (open, close) in [('[', ']'), ('(', ')')] {
         let Some((before, inside)) = rest.split_once(open) else { continue };

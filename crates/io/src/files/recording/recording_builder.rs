@@ -118,7 +118,12 @@ fn set_time(
                 Rounded(rate),
                 Rounded(step / rate / MILLISECOND)
             );
-            findings.push(Finding::note("counter-step", what));
+            let remedy = format!(
+                "if {} Hz is the rate of the rows, give --rate-hz {}",
+                Rounded(rate),
+                Rounded(step * rate)
+            );
+            findings.push(Finding::warning("counter-step", what, &remedy));
         }
         recording.time.iter_mut().for_each(|time| *time = (*time - first) / rate);
         return;

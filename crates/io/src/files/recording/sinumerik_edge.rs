@@ -22,13 +22,15 @@ use super::unit::Channel;
 use crate::files::error::FileError;
 use virtual_axes_core::encoding::TextReader;
 use virtual_axes_core::text::shortened;
-use virtual_axes_core::units::MILLISECOND;
+use virtual_axes_core::units::{MILLISECOND, Rounded};
 use virtual_axes_identify::recording::{Finding, RawRecording};
 
 /// Key of the list of signals, by which the format is detected.
 const SIGNALS: &str = "SignalListHFData";
 /// Maximum number of signals.
 const MAX_SIGNALS: usize = 10_000;
+/// Relative difference of equal sampling rates.
+const SAME_RATE: f64 = 1e-6;
 
 /// Returns true if a text file that begins with `head` has the format.
 pub(super) fn detects(head: &str) -> bool {
@@ -47,11 +49,25 @@ pub(super) fn inspect(input: &mut dyn Read, name: &str) -> Found<RecordingColumn
 pub(super) fn read(input: &mut dyn Read, context: &Context) -> Found<(RawRecording, Vec<Finding>)> {
     let mut document = Document::new(Some(*context));
     document.parse(input, context.name)?;
-    let Document { columns, assignment, channels, rows, rate, .. } = document;
+    let Document { columns, assignment, channels, rows, rate, file_rate, .. } = document;
     if rows == 0 {
         return Err(FileError::new(context.name, "there are no rows of HFData in the Payload"));
     }
     let mut findings = Vec::new();
+    if let (Some(given), Some(stated)) = (context.rate, file_rate)
+        && (given / stated - 1.0).abs() > SAME_RATE
+    {
+        findings.push(Finding::warning(
+            "rate-differs",
+            format!(
+                "{}: the {} Hz of --rate-hz replace the {} Hz of CycleTimeMs in the file",
+                context.name,
+                Rounded(given),
+                Rounded(stated)
+            ),
+            "leave out --rate-hz for the rate of the file",
+        ));
+    }
     let context = Context { rate, ..*context };
     let recording = build_recording(&context, channels, (&assignment, &columns), rows, &mut findings)?;
     Ok((recording, findings))
@@ -113,6 +129,8 @@ struct Document<'a> {
     channels: ChannelValues,
     rows: usize,
     rate: Option<f64>,
+    /// Rate that the file states.
+    file_rate: Option<f64>,
     /// Error that is no syntax error.
     error: Option<FileError>,
     /// True after the header if only the header is read.
@@ -128,6 +146,7 @@ impl<'a> Document<'a> {
             channels: ChannelValues::default(),
             rows: 0,
             rate: None,
+            file_rate: None,
             error: None,
             is_done: false,
         }
@@ -165,7 +184,8 @@ impl<'a> Document<'a> {
             self.is_done = true;
             return Err("only the header is read");
         };
-        self.rate = context.rate.or(header.rate());
+        self.file_rate = header.rate();
+        self.rate = context.rate.or(self.file_rate);
         context.rate = self.rate;
         match context.assign_found(&self.columns, &|| context.name.to_owned()) {
             Ok(assignment) => self.assignment = assignment,

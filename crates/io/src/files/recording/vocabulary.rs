@@ -83,7 +83,8 @@ const WORDS: &[(WordMeaning, &[&str])] = &[
     (Tffws, &["tffws"]),
     (Motor, &["motor", "mot"]),
     (Load, &["load"]),
-    (Filler, &["wert", "value", "val"]),
+    // "joint_states" and "joint telemetry" are topics, not axes.
+    (Filler, &["wert", "value", "val", "states", "telemetry"]),
     (
         Other("an error or a deviation"),
         &[
