@@ -107,10 +107,10 @@ def nc_program(
     `centripetal_acceleration` that of the tool tip, m/s².
 
     What is not given is that of the machine file (`part_program`). `dialect` is linuxcnc, fanuc, haas, sinumerik, grbl,
-    mach3, okuma or marlin. `work_offset` has X, Y and Z in m, then A, B and C in rad, as in `{"G54": (0.12, 0.08, -0.35)}`, or
-    texts in mm and degrees, as the command: `"G54=120,80,-350"`. `tools` is the path of a tool table (tool.tbl of
-    LinuxCNC, or CSV, both in mm), or length and radius in m by number, as in `{1: (0.05, 0.005)}`. `tool_change_s` is
-    the duration of a tool change, and `spindle_s` that of a change of the spindle speed, s.
+    mach3, okuma or marlin. `work_offset` has X, Y and Z in m, then A, B and C in rad, as in `{"G54": (0.12, 0.08,
+    -0.35)}`, or texts in mm and degrees, as the command: `"G54=120,80,-350"`. `tools` is the path of a tool table
+    (tool.tbl of LinuxCNC, or CSV, both in mm), or length and radius in m by number, as in `{1: (0.05, 0.005)}`.
+    `tool_change_s` is the duration of a tool change, and `spindle_s` that of a change of the spindle speed, s.
 
     Raises `ValueError` for other values.
     """
