@@ -52,7 +52,7 @@ struct Block {
     bend_speed: f64,
     /// True if the path has a corner at its start or end that G61 keeps.
     has_kink: bool,
-    /// True if the next motion starts before its end.
+    /// True if the next motion starts before its end, or it starts before the end of the one before.
     is_overlapping: bool,
     /// True for lines of X, Y and Z and for arcs in a plane.
     is_simple: bool,
@@ -347,6 +347,8 @@ impl TrapezoidPlanner {
         let tangents = [unit(first.jet(first.length)), unit(second.jet(0.0))];
         let angle = angle_between(&tangents, model);
         let kink_speed = self.kink_speed([first, second], &tangents, model);
+        let is_blendable =
+            before.is_simple && next.is_simple && are_coplanar([first, second], &tangents, model);
         let is_straight = angle < STRAIGHT || kink_speed > before.speed.max(next.speed);
         match first.at_end {
             CurveEnd::Stop => {
@@ -370,7 +372,7 @@ impl TrapezoidPlanner {
             }
             // The start of the next motion within the end of this one allows about half of the lower speed.
             CurveEnd::Blend(_)
-                if !(before.is_simple && next.is_simple)
+                if !is_blendable
                     && before.is_spatial
                     && next.is_spatial
                     && self.control.corners == CornerRule::Arc
@@ -380,9 +382,10 @@ impl TrapezoidPlanner {
                 self.push(&before, 0.0, Junction::Through(kink_speed));
             }
             CurveEnd::Blend([tolerance, rotary])
-                if !(before.is_simple && next.is_simple) && self.control.corners == CornerRule::Arc =>
+                if !is_blendable && self.control.corners == CornerRule::Arc =>
             {
                 before.is_overlapping = true;
+                next.is_overlapping = before.is_spatial && next.is_spatial;
                 // Deviation along the path, whose speed and acceleration include those of the rotary axes.
                 let spatial = norm(&tangents[0], &model.kinds.linear);
                 let tolerance =
@@ -391,7 +394,7 @@ impl TrapezoidPlanner {
                 let speed = 2.0 * (self.acceleration(&before) * deviation).sqrt();
                 self.push(&before, 0.0, Junction::Overlap(speed));
             }
-            CurveEnd::Blend(_) if angle > PI - REVERSAL || !(before.is_simple && next.is_simple) => {
+            CurveEnd::Blend(_) if angle > PI - REVERSAL || !is_blendable => {
                 self.push(&before, 0.0, Junction::Stop)
             }
             CurveEnd::Blend(_) if is_straight => self.push(&before, 0.0, Junction::Through(f64::INFINITY)),
@@ -736,6 +739,16 @@ fn curve(piece: &Piece) -> &MotionCurve {
         PieceCurve::Exact(curve) => curve,
         _ => unreachable!("blocks are exact curves"),
     }
+}
+
+/// Returns true if two motions that meet lie in the plane of the arcs among them.
+fn are_coplanar(curves: [&MotionCurve; 2], tangents: &[JointVector; 2], model: &MachineModel) -> bool {
+    curves.iter().all(|curve| match &curve.shape {
+        Shape::Arc(arc) => (0..model.joints.len())
+            .filter(|joint| !arc.plane.contains(joint))
+            .all(|joint| tangents.iter().all(|tangent| tangent[joint].abs() < STRAIGHT)),
+        _ => true,
+    })
 }
 
 /// Returns true for X, Y and Z.
