@@ -18,6 +18,7 @@ use std::path::PathBuf;
 use nalgebra::Vector3;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::kinematics::Kinematics;
+use virtual_axes_core::units::seconds;
 
 pub use self::error::CompileError;
 use self::model::{ChangedProgram, Changes, ProgramModel};
@@ -42,13 +43,13 @@ const LARGEST_SHIFT: f64 = 3.0;
 const MEAN_WEIGHT: f64 = 0.3;
 /// Part of the largest error from which a line is one of the worst.
 const WORST: f64 = 0.9;
-/// Factors by which the feed of a line is lowered and raised, and the least one in all.
-const SLOWER: f64 = 0.8;
+/// Factors by which the feed of a line is lowered, the first that has an effect, and raised, and the least one in all.
+const SLOWER: [f64; 3] = [0.8, 0.9, 0.95];
 const FASTER: f64 = 1.15;
 const SLOWEST: f64 = 0.1;
 /// Change of the figures by which a program is better.
 const IMPROVEMENT: f64 = 0.02;
-/// Cycle time by which setpoints on the grid of the position cycle may exceed the limit, relative to it.
+/// Gain of time, relative to the cycle time, below which a program is no faster.
 const TIME_ROUNDING: f64 = 2e-3;
 /// Pieces before and after a point whose errors decide on its shift, and the growth that is no growth.
 const NEAR: usize = 2;
@@ -166,7 +167,8 @@ pub fn compile(
     let before = simulator.run(&planned, planned.path(), plants.len())?;
     let longest = match options.aim {
         CompileAim::Tolerance(_) => f64::INFINITY,
-        CompileAim::Time(more) => before.time * (1.0 + more) * (1.0 + TIME_ROUNDING),
+        // Setpoints lie on the grid of the position cycle.
+        CompileAim::Time(more) => before.time * (1.0 + more) + seconds(machine.periods().position),
     };
     let (mut best, mut left_out): (Option<(ProgramModel, Candidate)>, BTreeSet<usize>) =
         (None, BTreeSet::new());
@@ -461,13 +463,20 @@ impl Search<'_> {
             if worst.is_empty() {
                 break;
             }
-            let mut changes = best.changes.clone();
             let slowed: BTreeSet<usize> = worst.iter().flat_map(|&piece| self.around(piece, 1)).collect();
-            for piece in slowed {
-                changes.feeds[piece] = (changes.feeds[piece] * SLOWER).max(SLOWEST);
+            let mut next = None;
+            for factor in SLOWER {
+                let mut changes = best.changes.clone();
+                for piece in &slowed {
+                    changes.feeds[*piece] = (changes.feeds[*piece] * factor).max(SLOWEST);
+                }
+                next = self
+                    .candidate(changes)?
+                    .filter(|next| next.runs.time <= self.time && self.key(next) < self.key(&best));
+                if next.is_some() {
+                    break;
+                }
             }
-            let next = self.candidate(changes)?;
-            let next = next.filter(|next| next.runs.time <= self.time && self.key(next) < self.key(&best));
             match next {
                 Some(next) => best = self.shifted(next, 0.4, 1)?,
                 None => worst.iter().for_each(|&piece| is_blocked[piece] = true),
