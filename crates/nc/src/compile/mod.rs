@@ -43,8 +43,8 @@ const LARGEST_SHIFT: f64 = 3.0;
 const MEAN_WEIGHT: f64 = 0.3;
 /// Part of the largest error from which a line is one of the worst.
 const WORST: f64 = 0.9;
-/// Factors by which the feed of a line is lowered, the first that has an effect, and raised, and the least one in all.
-const SLOWER: [f64; 3] = [0.8, 0.9, 0.95];
+/// Factors by which the feed of a line is lowered and raised, and the least one in all.
+const SLOWER: f64 = 0.8;
 const FASTER: f64 = 1.15;
 const SLOWEST: f64 = 0.1;
 /// Change of the figures by which a program is better.
@@ -463,11 +463,12 @@ impl Search<'_> {
             if worst.is_empty() {
                 break;
             }
-            let slowed: BTreeSet<usize> = worst.iter().flat_map(|&piece| self.around(piece, 1)).collect();
+            let before: BTreeSet<usize> = worst.iter().map(|piece| piece.saturating_sub(1)).collect();
+            let around: BTreeSet<usize> = worst.iter().flat_map(|&piece| self.around(piece, 1)).collect();
             let mut next = None;
-            for factor in SLOWER {
+            for (pieces, factor) in [(&before, SLOWER), (&around, SLOWER), (&around, SLOWER.sqrt())] {
                 let mut changes = best.changes.clone();
-                for piece in &slowed {
+                for piece in pieces {
                     changes.feeds[*piece] = (changes.feeds[*piece] * factor).max(SLOWEST);
                 }
                 next = self
