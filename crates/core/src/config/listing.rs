@@ -93,8 +93,10 @@ pub fn text() -> String {
         let default = if default == "required" { default } else { format!("default {default}") };
         let live = if live == "yes" { ", live" } else { "" };
         let _ = writeln!(out, "{key}");
-        let _ = writeln!(out, "    {range}; {default}{live}; {owner}");
-        for line in wrapped(&description, 76) {
+        for line in [format!("{range}; {default}{live}; {owner}"), description]
+            .iter()
+            .flat_map(|text| wrapped(text, 76))
+        {
             let _ = writeln!(out, "    {line}");
         }
     }
