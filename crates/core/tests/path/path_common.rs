@@ -85,23 +85,28 @@ pub fn assert_within_limits(program: &Program) {
     }
 }
 
-/// Returns the smallest distance of the tip from the path between two values of progress, by sampling and interval
-/// reduction around each sample that is nearer than its neighbors.
+/// Returns the smallest distance of the tip from the path between two values of progress, block by block, by sampling and
+/// interval reduction around each sample that is nearer than its neighbors.
 pub fn brute_force(path: &Path, from: f64, to: f64, tip: &Vector3<f64>) -> f64 {
     let at = |u: f64| (path.tool(u).tip - tip).norm();
+    let starts = (0..path.blocks().len()).map(|block| path.start_of(block)).filter(|u| from < *u && *u < to);
+    let bounds: Vec<f64> = [from].into_iter().chain(starts).chain([to]).collect();
     let count = 2000;
-    let progress = |i: usize| from + (to - from) * i as f64 / count as f64;
-    let samples: Vec<f64> = (0..=count).map(|i| at(progress(i))).collect();
-    let refined = |i: usize| {
-        let (mut low, mut high) = (progress(i.saturating_sub(1)), progress((i + 1).min(count)));
-        for _ in 0..90 {
-            let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-            if at(a) < at(b) { high = b } else { low = a }
-        }
-        at(low).min(at(high))
+    let nearest_of_block = |from: f64, to: f64| {
+        let progress = |i: usize| from + (to - from) * i as f64 / count as f64;
+        let samples: Vec<f64> = (0..=count).map(|i| at(progress(i))).collect();
+        let refined = |i: usize| {
+            let (mut low, mut high) = (progress(i.saturating_sub(1)), progress((i + 1).min(count)));
+            for _ in 0..90 {
+                let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+                if at(a) < at(b) { high = b } else { low = a }
+            }
+            at(low).min(at(high))
+        };
+        let is_least = |i: &usize| {
+            samples[*i] <= samples[i.saturating_sub(1)] && samples[*i] <= samples[(i + 1).min(count)]
+        };
+        (0..=count).filter(is_least).map(refined).fold(at(from).min(at(to)), f64::min)
     };
-    let is_least =
-        |i: &usize| samples[*i] <= samples[i.saturating_sub(1)] && samples[*i] <= samples[(i + 1).min(count)];
-    let least = (0..=count).filter(is_least).map(refined).fold(f64::INFINITY, f64::min);
-    least.min(at(from)).min(at(to))
+    bounds.windows(2).map(|pair| nearest_of_block(pair[0], pair[1])).fold(f64::INFINITY, f64::min)
 }
