@@ -33,8 +33,6 @@ const BANDWIDTH_STARTS: [f64; 2] = [180.0, 300.0];
 const KEPT: f64 = 1.1;
 /// The same for the cycle at which the signals are renewed.
 const RENEWED: f64 = 1.5;
-/// Residual relative to the least one up to which a position cycle is possible.
-const ADMISSIBLE: f64 = 1.5;
 /// Starts of each gain that are followed to their minimum.
 const FOLLOWED: usize = 1;
 /// Gains whose minimum is followed with a free gain; the best one can be a local minimum.
@@ -42,7 +40,7 @@ const FREED: usize = 4;
 /// Minima with a free gain that are followed until they converge.
 const FINISHED: usize = 2;
 /// Longest difference of the lag from a whole number of position cycles, s.
-const GRID_TOLERANCE: f64 = 0.15e-3;
+const GRID_TOLERANCE: f64 = 0.1e-3;
 /// Position cycles that are compared, ns; the search starts with the first one that the recordings permit.
 const CYCLES: [Nanoseconds; 5] =
     [2 * MILLISECOND_NS, MILLISECOND_NS, 4 * MILLISECOND_NS, 6 * MILLISECOND_NS, MILLISECOND_NS / 2];
@@ -80,8 +78,6 @@ pub(super) struct LoopFit {
     pub rms_with_given_gain: Option<f64>,
     /// VFFW and lag (s) at both ends of the valley in which the residual hardly changes.
     pub valley: Option<[(f64, f64); 2]>,
-    /// Axis, periods and shift of the commanded position, s, with other position cycles that explain the motion alike.
-    pub other_cycles: Vec<(AxisConfig, Periods, f64)>,
 }
 
 /// Recordings and options of the fit.
@@ -132,6 +128,11 @@ impl LoopProblem<'_> {
     /// Returns true if the velocity feedforward has an effect on a recording.
     fn has_velocity_feedforward(&self, axis: &AxisConfig) -> bool {
         self.has(FeedforwardMode::Velocity) && axis.feedforward.velocity != 0.0
+    }
+
+    /// Returns true if VFFW represents the part of the lag, s, that is no whole number of position cycles.
+    fn is_between(&self, axis: &AxisConfig, periods: &Periods, lag: f64) -> bool {
+        !divides(periods.position, lag) && self.has_velocity_feedforward(axis)
     }
 
     fn parameters(&self, axis: &AxisConfig) -> Vec<LoopParameter> {
@@ -375,19 +376,13 @@ impl LoopProblem<'_> {
         // Long recordings are searched in part only.
         let search = LoopProblem { duration: SEARCHED, ..*self };
         let first = search.best(axis, start, &parameters, lag)?;
-        let (periods, free, others) = search.best_cycle((axis, given), &cycles, &parameters, first);
+        let (periods, free) = search.best_cycle((axis, given), &cycles, &parameters, first);
         let free = search.polish(axis, &periods, &parameters, free);
         // A residual below that of usual encoders outweighs the prior.
         let noise = self.correlated_noise(axis, &periods, &parameters, &free.values)?;
         let problem = LoopProblem { noise: noise.min(self.noise), ..*self };
         let free = problem.converge(axis, &periods, &parameters, &free.values)?;
-        let other_cycles = others.into_iter().map(|(periods, found)| {
-            let (axis, shift) = apply(axis, &periods, &parameters, &found.values);
-            (axis, periods, shift)
-        });
-        let other_cycles = other_cycles.collect();
-        let fit = problem.finish((axis, &periods), parameters.clone(), free)?;
-        Some(LoopFit { other_cycles, ..fit })
+        problem.finish((axis, &periods), parameters, free)
     }
 
     /// Rounds the minimum `free` to the delays that a machine file can have, and determines its errors.
@@ -408,32 +403,27 @@ impl LoopProblem<'_> {
         // The delay of the machine file is a whole number of position cycles.
         let tsp = seconds(periods.position);
         let cycles = (free.values[0] / tsp).round().max(0.0);
-        let others = &parameters[1..];
-        let rounded = |axis: &AxisConfig| {
-            let (fixed, _) = apply(axis, periods, &[LoopParameter::Lag], &[cycles * tsp]);
-            let last = self.converge(&fixed, periods, others, &free.values[1..])?;
-            Some((fixed, last))
-        };
-        let exact = rounded(axis)?;
-        // A small part of a cycle is many encoder increments at high speed.
-        let is_rest = !divides(periods.position, free.values[0]) || exact.1.cost > KEPT * KEPT * free.cost;
-        let between = (is_rest && self.has_velocity_feedforward(axis)).then(|| {
-            // The lag is α + (1 − VFFW) / Kp: VFFW represents what is left of it between two cycles.
+        let is_between = self.is_between(axis, periods, free.values[0]);
+        let mut between = axis.clone();
+        if is_between {
+            // The lag is α + (1 − VFFW) / Kp: VFFW represents what is left of it between two cycles, with the fitted gain.
             let gain = parameters.iter().zip(&free.values).find(|(p, _)| **p == LoopParameter::Gain);
             let gain = gain.map_or(self.given_gain, |(_, value)| *value);
-            let mut between = axis.clone();
+            between.position_loop.gain = gain;
             between.feedforward.velocity -= (free.values[0] - cycles * tsp) * gain;
-            between
-        });
-        let between = between.as_ref().and_then(rounded);
-        let (fixed, last) = between.filter(|(_, last)| last.cost < exact.1.cost).unwrap_or(exact);
-        let (found, _) = apply(&fixed, periods, others, &last.values);
+        }
+        let (fixed, _) = apply(&between, periods, &[LoopParameter::Lag], &[cycles * tsp]);
+        let pairs = parameters.iter().copied().zip(free.values.iter().copied());
+        let (others, from): (Vec<LoopParameter>, Vec<f64>) =
+            pairs.clone().filter(|(parameter, _)| is_rounded(*parameter, is_between)).unzip();
+        let last = self.converge(&fixed, periods, &others, &from)?;
+        let (found, _) = apply(&fixed, periods, &others, &last.values);
         let covariance = self.covariance(axis, periods, &parameters, &free.values)?;
         let errors = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
-        let count = self.residuals(&fixed, periods, others, &last.values)?.len().max(1) as f64;
-        let values = parameters.iter().enumerate().map(|(k, &parameter)| LoopValue {
+        let count = self.residuals(&fixed, periods, &others, &last.values)?.len().max(1) as f64;
+        let values = pairs.enumerate().map(|(k, (parameter, value))| LoopValue {
             parameter,
-            value: if k == 0 { free.values[0] } else { last.values[k - 1] },
+            value: others.iter().position(|other| *other == parameter).map_or(value, |n| last.values[n]),
             error: errors[k],
         });
         let rms_with_given_gain = given_cost.filter(|_| !is_kept);
@@ -445,7 +435,6 @@ impl LoopProblem<'_> {
             rms: (last.cost / count).sqrt(),
             rms_with_given_gain: rms_with_given_gain.map(|cost| (cost / count).sqrt()),
             valley: self.valley(&found, periods, free.values[0]),
-            other_cycles: Vec::new(),
             axis: found,
             periods: *periods,
         })
@@ -453,7 +442,9 @@ impl LoopProblem<'_> {
 
     /// Fits the values of `known` again with the plant of `axis`.
     pub fn renew(&self, axis: &AxisConfig, known: &LoopFit) -> Option<LoopFit> {
-        let values = known.values.iter().filter(|value| value.parameter != LoopParameter::Lag);
+        let lag = known.values.iter().find(|value| value.parameter == LoopParameter::Lag);
+        let is_between = lag.is_some_and(|lag| self.is_between(axis, &known.periods, lag.value));
+        let values = known.values.iter().filter(|value| is_rounded(value.parameter, is_between));
         let (parameters, from): (Vec<LoopParameter>, Vec<f64>) =
             values.map(|value| (value.parameter, value.value)).unzip();
         let found = self.converge(axis, &known.periods, &parameters, &from)?;
@@ -468,8 +459,7 @@ impl LoopProblem<'_> {
         Some(fit)
     }
 
-    /// Returns the position cycle with the least residual and its minimum, and those of the other cycles that the recordings
-    /// do not exclude. Among cycles with about the same residual, the
+    /// Returns the position cycle with the least residual and its minimum. Among cycles with about the same residual, the
     /// renewal of the signals is preferred, then that of the machine file if it divides the lag, then the first one.
     ///
     /// A motion shows β + Tsp, so the others start with β changed by the difference of the cycles.
@@ -479,8 +469,8 @@ impl LoopProblem<'_> {
         cycles: &[Periods],
         parameters: &[LoopParameter],
         first: Candidate,
-    ) -> (Periods, Candidate, Vec<(Periods, Candidate)>) {
-        let Some(start) = cycles.first() else { return (*given, first, Vec::new()) };
+    ) -> (Periods, Candidate) {
+        let Some(start) = cycles.first() else { return (*given, first) };
         let others = cycles.iter().skip(1).filter_map(|periods| {
             let change = seconds(start.position) - seconds(periods.position);
             let from = parameters.iter().zip(&first.values).map(|(parameter, value)| match parameter {
@@ -495,8 +485,8 @@ impl LoopProblem<'_> {
         let least = all.iter().map(|(_, found)| found.cost).fold(f64::INFINITY, f64::min);
         let renewal = self.renewal(given);
         let limit = |periods: &Periods| if Some(periods.position) == renewal { RENEWED } else { KEPT };
-        let close = all.iter().filter(|(periods, found)| found.cost <= limit(periods).powi(2) * least);
-        let preference = |(periods, found): &&(Periods, Candidate)| {
+        let close = all.into_iter().filter(|(periods, found)| found.cost <= limit(periods).powi(2) * least);
+        let preference = |(periods, found): &(Periods, Candidate)| {
             let cycle = periods.position;
             let is_dividing = divides(cycle, found.values[0]);
             (
@@ -507,12 +497,7 @@ impl LoopProblem<'_> {
                 cycle,
             )
         };
-        let (periods, found) = close.max_by_key(preference).cloned().unwrap_or((*start, first));
-        let is_other = |(other, minimum): &(Periods, Candidate)| {
-            other.position != periods.position && minimum.cost <= ADMISSIBLE * ADMISSIBLE * least
-        };
-        all.retain(is_other);
-        (periods, found, all)
+        close.max_by_key(preference).unwrap_or((*start, first))
     }
 
     /// Returns the minimum with the gain of the machine file, and its parameters; none if the gain is not fitted.
@@ -589,6 +574,12 @@ impl LoopProblem<'_> {
         let slope = covariance[(0, 1)] / covariance[(1, 1)];
         Some([-half, half].map(|change| (weight + change, lag + slope * change)))
     }
+}
+
+/// Returns true if a parameter is fitted again with the rounded lag. The gain with which VFFW represents a part of the lag
+/// stays that of the exact lag.
+fn is_rounded(parameter: LoopParameter, is_between: bool) -> bool {
+    parameter != LoopParameter::Lag && !(is_between && parameter == LoopParameter::Gain)
 }
 
 /// Returns true if the lag, s, is a whole number of cycles.

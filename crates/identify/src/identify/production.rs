@@ -26,7 +26,7 @@ use crate::recording::{Finding, SignalSpan, Signals};
 use virtual_axes_core::config::{AxisConfig, AxisKind, AxisUnits, Periods};
 use virtual_axes_core::statistics::mean;
 use virtual_axes_core::units::{
-    DEGREE, MICROSECOND_NS, MILLISECOND, MILLISECOND_NS, Nanoseconds, POSITION_GAIN, Rounded, seconds,
+    DEGREE, MICROSECOND_NS, MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, seconds,
 };
 
 /// Part of the travel in the direction that is seldom, from which on the axis moves in both.
@@ -160,7 +160,7 @@ fn identify_loop(
     let before = found.axis.clone();
     for _ in 0..if has_plant { PLANT_PASSES } else { 0 } {
         found.axis = fit.axis.clone();
-        let ripple = simulated_ripple(&recordings, (&fit.axis, &fit.periods, 0.0));
+        let ripple = simulated_ripple(&recordings, &fit);
         let signals: Vec<&Signals> = recordings.iter().map(|(signals, _)| *signals).collect();
         let Some(plant) = fit_plant(&signals, &found.axis, Some(&ripple)) else { break };
         apply_plant(&plant, found);
@@ -172,9 +172,6 @@ fn identify_loop(
             None => break,
         }
     }
-    if found.inertia.is_some() {
-        widen_inertia(&recordings, &fit, found);
-    }
     let interpolated =
         inputs.iter().filter(|input| is_interpolated(input.signals, seconds(fit.periods.position)));
     let coarsest = interpolated.map(|input| input.signals.period).fold(0.0, f64::max);
@@ -182,50 +179,15 @@ fn identify_loop(
     report_interpolation(inputs, seconds(fit.periods.position), found);
 }
 
-/// Widens the interval of the inertia such that it contains the inertias with the other position cycles that the recordings
-/// do not exclude: each cycle has its own ripple in the current.
-fn widen_inertia(recordings: &[(&Signals, FeedforwardMode)], fit: &LoopFit, found: &mut Identification) {
-    let signals: Vec<&Signals> = recordings.iter().map(|(signals, _)| *signals).collect();
-    let of = |(axis, periods, shift): &(AxisConfig, Periods, f64)| {
-        let ripple = simulated_ripple(recordings, (axis, periods, *shift));
-        let plant = fit_plant(&signals, axis, Some(&ripple)).filter(is_inertia_known)?;
-        Some((periods.position, plant.inertia.value))
-    };
-    let mut others: Vec<(Nanoseconds, f64)> = fit.other_cycles.iter().filter_map(of).collect();
-    let Some(inertia) = found.inertia.as_mut().filter(|_| !others.is_empty()) else { return };
-    let farthest = others.iter().map(|(_, value)| (value - inertia.value).abs()).fold(0.0, f64::max);
-    inertia.error = inertia.error.hypot(farthest / INTERVAL);
-    others.push((fit.periods.position, inertia.value));
-    others.sort_unstable_by_key(|(cycle, _)| *cycle);
-    let milliseconds = |cycle: Nanoseconds| Rounded(cycle as f64 / MILLISECOND_NS as f64).to_string();
-    let cycles: Vec<String> = others.iter().map(|(cycle, _)| milliseconds(*cycle)).collect();
-    let values = others.iter().map(|(_, value)| *value);
-    let (low, high) =
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), value| (l.min(value), h.max(value)));
-    found.findings.push(Finding::note(
-        "unseen-cycle",
-        format!(
-            "the recordings do not show the position cycle: with cycles of {} ms the current gives inertias of {} to {}; \
-             the standard error of the inertia includes it",
-            cycles.join(", "),
-            Rounded(low),
-            Rounded(high)
-        ),
-    ));
-}
-
-/// Returns the ripple of the current at the samples, with the shift of the commanded position, s: the simulated current of
-/// an instant minus the mean over a position cycle.
-fn simulated_ripple(
-    recordings: &[(&Signals, FeedforwardMode)],
-    (axis, periods, shift): (&AxisConfig, &Periods, f64),
-) -> CurrentRipple {
+/// Returns the ripple of the current at the samples: the simulated current of an instant minus the mean over a
+/// position cycle.
+fn simulated_ripple(recordings: &[(&Signals, FeedforwardMode)], fit: &LoopFit) -> CurrentRipple {
     let of = |(k, (signals, mode)): (usize, &(&Signals, FeedforwardMode))| {
         let mut ripple: Vec<Vec<f64>> =
             signals.spans.iter().map(|span| vec![f64::NAN; span.position.len()]).collect();
-        for instant in trace_experiments(signals, k, periods, (*mode, shift, 1.0)) {
+        for instant in trace_experiments(signals, k, &fit.periods, (*mode, 0.0, 1.0)) {
             let mean = Experiment { ripple: 0.0, ..instant.clone() };
-            let simulated = [&instant, &mean].map(|experiment| simulate(axis, periods, experiment));
+            let simulated = [&instant, &mean].map(|experiment| simulate(&fit.axis, &fit.periods, experiment));
             let [Ok(at), Ok(mean)] = simulated else { continue };
             let difference = at.current.iter().zip(&mean.current).map(|(a, m)| a - m);
             let to = ripple[instant.span].iter_mut().skip(instant.sample);

@@ -1,6 +1,6 @@
 //! Section of gravity: currents at standstill and the gravity model.
 
-use virtual_axes_core::config::AxisKind;
+use virtual_axes_core::config::{AxisConfig, AxisKind};
 use virtual_axes_identify::identify::summary::GravitySummary;
 use virtual_axes_identify::identify::{GravityCurrent, GravitySource, Standstill};
 
@@ -13,6 +13,9 @@ use crate::{Chart, ChartAxis, ChartSeries, DisplayUnit, Panel, Section, SeriesSt
 
 /// Number of points of the line of the gravity model.
 const LINE_POINTS: usize = 181;
+/// Parts of the gravity of a rotary axis at the position q.
+const SINE: &str = "factor of sin q";
+const COSINE: &str = "factor of cos q";
 
 pub(super) fn section(page: &IdentificationPage) -> Section {
     let found = &page.found.identification;
@@ -21,6 +24,9 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         section
             .paragraphs
             .push("Gravity was not identified; the value of the initial machine is kept.".to_owned());
+        if page.kind() == AxisKind::Rotary {
+            section.tables.push(kept(page.axis()));
+        }
         return section;
     };
     let method = match gravity.source {
@@ -81,6 +87,15 @@ fn chart(page: &IdentificationPage, gravity: &GravitySummary, rests: &[Standstil
     }
 }
 
+/// Returns the gravity of the initial machine of a rotary axis.
+fn kept(axis: &AxisConfig) -> Table {
+    let current = axis.transmission_ratio * axis.gravity.tilt / axis.motor.torque_constant;
+    let (sine, cosine) = axis.gravity.phase.sin_cos();
+    let row = |name: &str, factor: f64| vec![name.to_owned(), digits(current * factor, 4)];
+    let rows = vec![row(SINE, cosine), row(COSINE, sine)];
+    Table { rows, ..Table::new("Gravity as motor current", &[("current", ""), ("model", "A")]) }
+}
+
 fn table(kind: AxisKind, gravity: &GravitySummary) -> Table {
     let part = |name: &str, of: fn(&GravityCurrent) -> f64| {
         let pair = |pair: Option<(&GravityCurrent, &GravityCurrent)>| {
@@ -104,8 +119,8 @@ fn table(kind: AxisKind, gravity: &GravitySummary) -> Table {
     };
     let mut rows = vec![part("constant", |g| g.constant)];
     if kind == AxisKind::Rotary {
-        rows.push(part("factor of sin q", |g| g.sine));
-        rows.push(part("factor of cos q", |g| g.cosine));
+        rows.push(part(SINE, |g| g.sine));
+        rows.push(part(COSINE, |g| g.cosine));
     }
     let columns =
         [("current", ""), ("in motion", "A"), ("±", "A"), ("at rest", "A"), ("±", "A"), ("model", "A")];
