@@ -195,10 +195,12 @@ impl<'a> LookAhead<'a> {
 
     /// Reads pieces until the entries from `from` on last about `time` or end at a stop.
     fn read_pieces(&mut self, from: usize, time: f64) -> Result<(), FeedPlanError> {
-        let mut ahead = 0.0;
+        // Intervals beyond the time, of which the last ones brake to the standstill at the end of the window.
+        let (mut ahead, mut beyond) = (0.0, 0);
         let rate_time = |interval: &Interval| interval.length / interval.cap.max(f64::MIN_POSITIVE);
         for entry in self.entries.range(from..) {
             ahead += entry.interval.as_ref().map_or(0.0, rate_time);
+            beyond += usize::from(ahead > time);
             if entry.is_stop {
                 return Ok(());
             }
@@ -229,6 +231,7 @@ impl<'a> LookAhead<'a> {
                     let entries = &mut self.entries;
                     self.model.divide(&piece, &around, |from, interval| {
                         ahead += rate_time(&interval);
+                        beyond += usize::from(ahead > time);
                         let (interval, piece) = (Some(interval), Some(Arc::clone(&piece)));
                         let (motion, standstill, is_stop) = (None, None, false);
                         entries.push_back(PlannedInterval {
@@ -244,7 +247,9 @@ impl<'a> LookAhead<'a> {
                         last.is_stop = piece.is_stop;
                     }
                     self.from_stop = if piece.is_stop { 0.0 } else { self.from_stop + piece.length };
-                    if piece.is_stop || (ahead > time && self.entries.len() >= from + 4 * MIN_INTERVALS) {
+                    if piece.is_stop
+                        || (beyond > MIN_INTERVALS && self.entries.len() >= from + 4 * MIN_INTERVALS)
+                    {
                         return Ok(());
                     }
                 }

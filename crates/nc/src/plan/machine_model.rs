@@ -13,9 +13,11 @@ const GROWTH: f64 = 0.17;
 /// Time of the first interval from a standstill, as a fraction of the jerk phase.
 const REST_FRACTION: f64 = 1.0 / 6.0;
 /// Largest interval in a ramp of the feed as a fraction of the distance covered during a jerk phase, and smallest as a
-/// fraction of the distance of the ramp: a jerk phase that is shorter takes one or two intervals.
+/// and largest fraction of the distance of the ramp: a jerk phase that is shorter takes one or two intervals, and a ramp
+/// without constant acceleration at least two.
 const PHASE_FRACTION: f64 = 1.0 / 8.0;
 const RAMP_FRACTION: f64 = 1.0 / 64.0;
+const RAMP_PART: f64 = 0.5;
 /// Fraction of the acceleration and jerk limits up to which the feed of a steady piece needs no ramp, and largest
 /// relative change of its bound.
 const STEADY_LOAD: f64 = 0.9;
@@ -186,10 +188,17 @@ impl MachineModel {
             }
         };
         let largest = largest.max(piece.length / MAX_PARTS as f64);
-        let ramp = ramp_distance(middle, acceleration, jerk);
-        let fine = match peak < middle {
-            true => PHASE_FRACTION * peak * phase_time(peak, acceleration, jerk),
-            false => (PHASE_FRACTION * middle * acceleration / jerk).max(RAMP_FRACTION * ramp),
+        // Elsewhere in the piece other joints can bound the motion along the path.
+        let places = [0.5, 1.0].map(|part| self.tangential(&self.node(piece, part * piece.length).0));
+        let least = |k: usize, start: f64| places.iter().map(|limits| limits[k]).fold(start, f64::min);
+        let (a_least, j_least) = (least(0, acceleration), least(1, jerk));
+        let ramp = ramp_distance(middle, a_least, j_least);
+        let peak_least = peak_rate(between, a_least, j_least);
+        let fine = match peak_least < middle {
+            true => PHASE_FRACTION * peak_least * phase_time(peak_least, a_least, j_least),
+            false => {
+                (PHASE_FRACTION * middle * a_least / j_least).max(RAMP_FRACTION * ramp).min(RAMP_PART * ramp)
+            }
         };
         let fine = fine.max(piece.length / MAX_PARTS as f64);
         // In a steady piece, only the ramps of its surroundings are divided finely.

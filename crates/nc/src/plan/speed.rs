@@ -20,8 +20,9 @@ use super::window::{Form, Stations, Window, WindowStart, dot};
 const MAX_ITERATIONS: usize = 60;
 /// Duality gap relative to the time at which the iteration ends.
 const GAP: f64 = 3e-4;
-/// Largest violation of a normalized constraint at the end.
+/// Largest violation of a normalized constraint at the end, and of one without √b: feeds are exceeded by at most 10⁻⁶.
 const RESIDUAL: f64 = 1e-3;
+const LINEAR_RESIDUAL: f64 = 2e-6;
 /// Violation of the optimality conditions at the end, relative to the time.
 const DUAL: f64 = 2e-3;
 /// Fractions of the bounds for the first guess.
@@ -133,9 +134,9 @@ impl Block {
     }
 
     /// Adds to `sums`: the matrix, its right-hand side without and with the factor of the barrier, the gradient of the
-    /// Lagrangian, and the gap. Sets `residual` to the largest violation.
+    /// Lagrangian, and the gap. Sets `residuals` to the largest violations of all constraints and of those without √b.
     #[inline(always)]
-    fn add_to(&self, sums: &mut [Lanes; SUMS], residual: &mut Lanes) {
+    fn add_to(&self, sums: &mut [Lanes; SUMS], residuals: &mut [Lanes; 2]) {
         for i in 0..LANES {
             let [s0, s1] = [self.slacks[0][i], self.slacks[1][i]];
             let [m0, m1] = [self.multipliers[0][i], self.multipliers[1][i]];
@@ -160,7 +161,9 @@ impl Block {
             sums[13][i] += slope * g1;
             sums[14][i] += slope * g2;
             sums[15][i] += s0 * m0 + s1 * m1;
-            residual[i] = larger(larger(r0, r1), residual[i]);
+            let residual = larger(r0, r1);
+            residuals[0][i] = larger(residual, residuals[0][i]);
+            residuals[1][i] = larger(residual * self.constant[i], residuals[1][i]);
         }
     }
 }
@@ -204,6 +207,8 @@ struct Progress {
     gap: f64,
     /// Largest violation of a constraint with its slack.
     residual: f64,
+    /// Largest violation of a constraint without √b.
+    linear_residual: f64,
     /// Sum of the magnitudes of the Lagrangian's derivatives times the coefficients.
     dual: f64,
     time: f64,
@@ -266,8 +271,9 @@ impl SpeedSolver {
         self.assemble(None);
         for _ in 0..MAX_ITERATIONS {
             let step = self.step(window, &ties, barrier)?;
-            let Progress { gap, residual, dual, time } = self.assemble(Some(step));
-            if gap <= GAP * time && residual <= RESIDUAL && dual <= DUAL * time {
+            let Progress { gap, residual, linear_residual, dual, time } = self.assemble(Some(step));
+            let is_feasible = residual <= RESIDUAL && linear_residual <= LINEAR_RESIDUAL;
+            if gap <= GAP * time && is_feasible && dual <= DUAL * time {
                 return Some((self.stations(window), true));
             }
             let average = gap / sides;
@@ -446,7 +452,7 @@ impl SliceOperation for Assembly<'_> {
     #[inline(always)]
     fn run(self) -> Progress {
         let SpeedSolver { coefficients, steps, sections, blocks, gradient, pulls, system, .. } = self.solver;
-        let (mut progress, mut residual, mut from) = (Progress::default(), [0.0; LANES], 0);
+        let (mut progress, mut residuals, mut from) = (Progress::default(), [[0.0; LANES]; 2], 0);
         for (k, section) in sections.iter().enumerate() {
             let (c, steps) = (three(coefficients, k), three(steps, k));
             let mut sums = [[0.0; LANES]; SUMS];
@@ -455,7 +461,7 @@ impl SliceOperation for Assembly<'_> {
                     block.pass(&steps, step);
                 }
                 block.linearize(&c, &section.tie);
-                block.add_to(&mut sums, &mut residual);
+                block.add_to(&mut sums, &mut residuals);
             }
             from = section.end;
             let time = section.weight / c[1].sqrt();
@@ -471,9 +477,8 @@ impl SliceOperation for Assembly<'_> {
             add(&mut pulls[k..], &[p0, p1, p2]);
             add(&mut gradient[k..], &[g0, g1 + slope, g2]);
         }
-        for value in residual {
-            progress.residual = larger(value, progress.residual);
-        }
+        let [residual, linear_residual] = residuals.map(|lanes| lanes.into_iter().fold(0.0, larger));
+        (progress.residual, progress.linear_residual) = (residual, linear_residual);
         // Derivatives by coefficients that are not free are 0.
         for (g, c) in gradient.iter().zip(coefficients.iter()) {
             progress.dual += (g * c).abs();

@@ -6,7 +6,7 @@ use virtual_axes_nc::motion::PathControl;
 use virtual_axes_nc::plan::{PartProgramPlanner, PlanOptions};
 
 use crate::programs::{Program, Step, blend};
-use crate::random::{controls, draws, program};
+use crate::random::{Draw, controls, draws, program};
 
 /// Velocity, acceleration and jerk of X, Y and Z in SI units.
 type AxisLimits = [[f64; 3]; 3];
@@ -72,6 +72,52 @@ fn axis_limits() -> impl Strategy<Value = [f64; 3]> {
         .prop_map(|exponents| [exponents.0, exponents.1, exponents.2].map(|exponent| 10f64.powf(exponent)))
 }
 
+/// Asserts that a program takes no longer with a higher feed or with one limit relaxed, each by `factor`.
+fn assert_monotonic(
+    draws: &[Draw],
+    feed: f64,
+    control: PathControl,
+    limits: &AxisLimits,
+    factor: f64,
+) -> Result<(), TestCaseError> {
+    let drawn = program(draws, feed, control);
+    let (time, _) = plan(&drawn, limits);
+    let (found, _) = plan(&program(draws, factor * feed, control), limits);
+    prop_assert!(found <= (1.0 + TOLERANCE) * time, "feed: {} s, {} s before", found, time);
+    for axis in 0..limits.len() {
+        for (order, name) in ["velocity", "acceleration", "jerk"].into_iter().enumerate() {
+            let mut relaxed = *limits;
+            relaxed[axis][order] *= factor;
+            let (found, _) = plan(&drawn, &relaxed);
+            prop_assert!(
+                found <= (1.0 + TOLERANCE) * time,
+                "{} {}: {} s, {} s before",
+                axis,
+                name,
+                found,
+                time
+            );
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_higher_jerk_does_not_stop_a_line_at_the_end_of_the_window() {
+    // One interval from constant speed to the standstill at the end of the look-ahead window lasted 0.2 s.
+    let draws = [(0, 0.0, -1.5, 0.0, 0.05)];
+    let limits = [[1.0, 3.934, 497.1], [1.0, 1.0, 31.62], [1.0, 3.737, 33.709]];
+    assert_monotonic(&draws, 0.02896, blend(316e-6), &limits, 3.5893).unwrap();
+}
+
+#[test]
+fn a_higher_acceleration_keeps_the_intervals_of_ramps_within_the_jerk_limit() {
+    // The speed stays below that of the acceleration limit: a ramp has two jerk phases.
+    let draws = [(0, 0.0, -3.1286, 0.0, 0.05), (0, -2.4569, -2.7997, 0.0, 0.05)];
+    let limits = [[1.0, 9.723, 416.86], [1.0, 1.0, 31.62], [1.0, 1.0, 31.62]];
+    assert_monotonic(&draws, 0.007854, blend(316e-6), &limits, 5.611).unwrap();
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, max_shrink_iters: 100, ..ProptestConfig::default() })]
 
@@ -80,18 +126,6 @@ proptest! {
         draws in draws(10), feed in -2.5..-0.5f64, control in controls(), limits in [axis_limits(), axis_limits(), axis_limits()],
         factor in 1.05..8.0f64,
     ) {
-        let feed = 10f64.powf(feed);
-        let drawn = program(&draws, feed, control);
-        let (time, _) = plan(&drawn, &limits);
-        let (found, _) = plan(&program(&draws, factor * feed, control), &limits);
-        prop_assert!(found <= (1.0 + TOLERANCE) * time, "feed: {} s, {} s before", found, time);
-        for axis in 0..limits.len() {
-            for (order, name) in ["velocity", "acceleration", "jerk"].into_iter().enumerate() {
-                let mut relaxed = limits;
-                relaxed[axis][order] *= factor;
-                let (found, _) = plan(&drawn, &relaxed);
-                prop_assert!(found <= (1.0 + TOLERANCE) * time, "{} {}: {} s, {} s before", axis, name, found, time);
-            }
-        }
+        assert_monotonic(&draws, 10f64.powf(feed), control, &limits, factor)?;
     }
 }
