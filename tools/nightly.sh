@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Runs the checks that take too long for ./test.sh: DDS Security, and processes that start at the same time.
+# Runs the checks that take too long for ./test.sh: DDS Security, processes that start at the same time, and random tests
+# with other cases than those of ./test.sh.
 #
 #     tools/nightly.sh
 #
@@ -37,6 +38,8 @@ simultaneous_starts() {
 check "build with DDS Security" cargo build --locked --features security --bin virtual_axes_node --target-dir .build/security
 check "tests of DDS Security" security_tests
 check "build" cargo build --release --locked --bins
+export PROPTEST_RNG_SEED=$RANDOM
+check "random tests, PROPTEST_RNG_SEED=$PROPTEST_RNG_SEED" cargo test --release --locked --workspace --no-fail-fast
 check "200 simultaneous starts" simultaneous_starts
 printf '%s\n' "${summary[@]}"
 exit $failed

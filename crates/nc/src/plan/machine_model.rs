@@ -14,10 +14,10 @@ const GROWTH: f64 = 0.17;
 const REST_FRACTION: f64 = 1.0 / 6.0;
 /// Largest interval in a ramp of the feed as a fraction of the distance covered during a jerk phase, and smallest as a
 /// and largest fraction of the distance of the ramp: a jerk phase that is shorter takes one or two intervals, and a ramp
-/// without constant acceleration at least two.
+/// without constant acceleration at least four.
 const PHASE_FRACTION: f64 = 1.0 / 8.0;
 const RAMP_FRACTION: f64 = 1.0 / 64.0;
-const RAMP_PART: f64 = 0.5;
+const RAMP_PART: f64 = 1.0 / 4.0;
 /// Fraction of the acceleration and jerk limits up to which the feed of a steady piece needs no ramp, and largest
 /// relative change of its bound.
 const STEADY_LOAD: f64 = 0.9;
