@@ -71,6 +71,9 @@ def test_two_contending_clocks_are_counted_as_jumps_with_a_limited_log(clock: Si
     # The clock is best effort: a message that is not taken in time is overwritten.
     assert 2 <= counted <= 2 * MESSAGES
     assert 1 <= lines <= LINES_A_SECOND * (seconds + 1)
+    cause = f"/clock: 2 publishers, of /{drive.name}, /{drive.name}; each change between their times is a jump"
+    drive.wait_for(lambda: cause in drive.process.output(), 5, "the cause of the jumps")
+    assert drive.process.output().count(cause) == 1
     other.close()
     clock.advance(0.3, 0.006)
     runs_as_before(clock)

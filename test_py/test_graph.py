@@ -5,7 +5,8 @@ from __future__ import annotations
 import signal
 
 from control_msgs.msg import SpeedScalingFactor
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from geometry_msgs.msg import PoseStamped
+from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
@@ -65,10 +66,15 @@ def test_incompatible_qos_is_logged_with_the_policy(fast: AxesClient):
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     fast.in_executor(lambda: fast.node.create_publisher(JointTrajectory, "/psec", best_effort))
     fast.in_executor(lambda: fast.node.create_subscription(JointState, "/joint_states", lambda _: None, latched))
+    manual = QoSProfile(depth=5, liveliness=LivelinessPolicy.MANUAL_BY_TOPIC)
+    fast.in_executor(
+        lambda: fast.node.create_subscription(PoseStamped, f"{fast.target}/tool_pose", lambda _: None, manual)
+    )
     fast.in_executor(lambda: fast.node.create_publisher(SpeedScalingFactor, f"{fast.target}/speed_scaling_input", 10))
     for line in (
         f"/psec: the QoS of the publisher of node /{fast.name} does not match (reliability)",
         f"/joint_states: the QoS of the subscription of node /{fast.name} does not match (durability)",
+        f"/virtual_axes/tool_pose: the QoS of the subscription of node /{fast.name} does not match (liveliness)",
     ):
         fast.wait_for(lambda: line in fast.process.output(), 5, line)
     assert "speed_scaling_input: the QoS" not in fast.process.output()

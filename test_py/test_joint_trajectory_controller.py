@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -50,14 +50,19 @@ def at_home(drive: AxesClient) -> None:
     go_home(drive)
 
 
-def query(drive: AxesClient, time: int) -> QueryTrajectoryState.Response:
-    """Calls ~/query_state for a time, ns."""
+@pytest.fixture(scope="module")
+def query(drive: AxesClient) -> Iterator[Callable[[int], QueryTrajectoryState.Response]]:
+    """Yields a function that calls ~/query_state for a time, ns."""
     client = drive.in_executor(lambda: drive.node.create_client(QueryTrajectoryState, f"{drive.target}/query_state"))
-    try:
-        drive.wait_for(client.service_is_ready, 20, "service query_state")
+
+    def call(time: int) -> QueryTrajectoryState.Response:
         future = client.call_async(QueryTrajectoryState.Request(time=to_time(time)))
         drive.wait_for(future.done, 20, "response of query_state")
         return future.result()
+
+    try:
+        drive.wait_for(client.service_is_ready, 20, "service query_state")
+        yield call
     finally:
         drive.in_executor(lambda: drive.node.destroy_client(client))
 
@@ -97,8 +102,10 @@ def test_a_trajectory_on_the_topic_is_executed_and_shown(drive: AxesClient) -> N
     assert after["x"] == before["x"] and after["y"] > before["y"]
 
 
-def test_query_state_returns_the_setpoints_planned_at_a_time(drive: AxesClient) -> None:
-    response = query(drive, drive.now())
+def test_query_state_returns_the_setpoints_planned_at_a_time(
+    drive: AxesClient, query: Callable[[int], QueryTrajectoryState.Response]
+) -> None:
+    response = query(drive.now())
     assert (response.success, response.message) == (False, "no trajectory is active or waiting")
     assert dict(zip(response.name, response.position, strict=True)) == drive.latest("psec")
     # It starts in 3 s of simulated time, of which little passes meanwhile, as the axes are at rest.
@@ -107,7 +114,7 @@ def test_query_state_returns_the_setpoints_planned_at_a_time(drive: AxesClient) 
     trajectory.header.stamp = to_time(start)
     number = drive.send(trajectory)
     drive.decision(number)
-    middle = query(drive, start + NANOSECONDS // 2)
+    middle = query(start + NANOSECONDS // 2)
     state = dict(zip(middle.name, zip(middle.position, middle.velocity, middle.acceleration, strict=True), strict=True))
     # A quintic from rest to rest: half of the way, 15/8 of the mean speed, no acceleration. The time is rounded up to a
     # position cycle, by at most 6 ms.
@@ -116,7 +123,7 @@ def test_query_state_returns_the_setpoints_planned_at_a_time(drive: AxesClient) 
     assert state["a"][1] == pytest.approx(0.3 * 15 / 8, rel=1e-3)
     assert state["y"] == (0, 0, 0)
     for outside in (start - NANOSECONDS, start + 2 * NANOSECONDS):
-        found = query(drive, outside)
+        found = query(outside)
         assert not found.success and "no trajectory commands a joint at" in found.message
     ended = drive.end(number, 30)
     drive.wait_until(to_ns(ended.header.stamp), 20)

@@ -121,15 +121,6 @@ def test_rviz_without_its_package_is_rejected(file: str, monkeypatch: pytest.Mon
         nodes(file, rviz="true", robot_state_publisher="false")
 
 
-@pytest.mark.parametrize("file", [ONE, TWO])
-def test_without_robot_state_publisher_nothing_is_started(file: str, monkeypatch: pytest.MonkeyPatch):
-    """The message names the Debian package and the argument that omits the model, with which the node starts."""
-    monkeypatch.delitem(substitutions.PROGRAMS, ("robot_state_publisher", "robot_state_publisher"))
-    with pytest.raises(RuntimeError, match=r"ros-\$ROS_DISTRO-robot-state-publisher.*robot_state_publisher:=false"):
-        nodes(file)
-    assert by_executable(nodes(file, robot_state_publisher="false")).keys() == {"virtual_axes_node"}
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -177,7 +168,10 @@ def test_without_robot_state_publisher_no_node_is_started(monkeypatch: pytest.Mo
     monkeypatch.setattr(substitutions, "PROGRAMS", only)
     executed = launch.visit(launch.LaunchContext(), [description(file)])
     started = []
-    with pytest.raises(RuntimeError, match="robot_state_publisher not found.*robot_state_publisher:=false"):
+    with pytest.raises(
+        RuntimeError,
+        match=r"robot_state_publisher not found.*ros-\$ROS_DISTRO-robot-state-publisher.*robot_state_publisher:=false",
+    ):
         started += [action for action in executed if isinstance(action, NodeAction)]
     assert not started
     assert by_executable(nodes(file, robot_state_publisher="false")).keys() == {"virtual_axes_node"}

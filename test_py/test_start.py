@@ -153,6 +153,7 @@ def test_publish_rate_decimates_the_grid(start: Callable[..., AxesClient]):
         ("RMW_IMPLEMENTATION", "rmw_zenoh_cpp", "rmw_fastrtps_cpp"),
         ("FASTDDS_BUILTIN_TRANSPORTS", "LARGE_DATA", "UDPv4"),
         ("FASTDDS_BUILTIN_TRANSPORTS", "SHM", "UDPv4"),
+        ("FASTDDS_BUILTIN_TRANSPORTS", "UDPv6", "UDPv4"),
     ],
 )
 def test_a_transport_that_the_node_does_not_have_causes_a_warning(

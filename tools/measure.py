@@ -278,8 +278,9 @@ def churn(args: argparse.Namespace) -> bool:
         for _ in range(FIRST_VISITS):
             visit(process.domain_id)
         count, rows = 0, []
-        for minute in range(0, args.minutes + 1, CHURN_STEP_MINUTES):
-            deadline = time.monotonic() + 60 * CHURN_STEP_MINUTES * (minute > 0)
+        step = min(CHURN_STEP_MINUTES, args.minutes)
+        for minute in range(0, args.minutes + 1, step):
+            deadline = time.monotonic() + 60 * step * (minute > 0)
             while time.monotonic() < deadline:
                 if count % 10 == 9:
                     with Participant(process.domain_id, "sink", 10) as killed:

@@ -188,7 +188,7 @@ impl Environment {
 /// Returns a warning for each variable that leads other nodes to transports or a discovery that this node does not have.
 fn transport_warnings(get: impl Fn(&str) -> Option<String>) -> Vec<String> {
     /// Fast DDS and Cyclone DDS, by default, discover by multicast and exchange data by UDP.
-    const UDP: &str = "this node discovers by multicast and exchanges data by UDP only";
+    const UDP: &str = "this node discovers by multicast and exchanges data by UDP over IPv4 only";
     let warn = |name: &str, remedy: &str| {
         let value = get(name)?;
         let value = value.escape_debug().take(200).collect::<String>();
@@ -197,7 +197,7 @@ fn transport_warnings(get: impl Fn(&str) -> Option<String>) -> Vec<String> {
     let is_foreign_rmw = |value: &String| {
         !["rmw_fastrtps_cpp", "rmw_fastrtps_dynamic_cpp", "rmw_cyclonedds_cpp"].contains(&value.as_str())
     };
-    let is_udp = |value: &String| ["DEFAULT", "DEFAULTv6", "UDPv4", "UDPv6"].contains(&value.as_str());
+    let is_udp = |value: &String| ["DEFAULT", "UDPv4"].contains(&value.as_str());
     let rmw = get("RMW_IMPLEMENTATION").filter(is_foreign_rmw);
     let transports = get("FASTDDS_BUILTIN_TRANSPORTS").filter(|value| !is_udp(value));
     let profiles =
@@ -298,6 +298,8 @@ mod tests {
             ("RMW_IMPLEMENTATION", "rmw_zenoh_cpp", "rmw_fastrtps_cpp"),
             ("FASTDDS_BUILTIN_TRANSPORTS", "LARGE_DATA", "UDPv4"),
             ("FASTDDS_BUILTIN_TRANSPORTS", "SHM", "UDPv4"),
+            ("FASTDDS_BUILTIN_TRANSPORTS", "UDPv6", "UDPv4"),
+            ("FASTDDS_BUILTIN_TRANSPORTS", "DEFAULTv6", "UDPv4"),
             ("CYCLONEDDS_URI", "file:///etc/cyclone.xml", "ROS_STATIC_PEERS"),
         ] {
             let environment = read(&[(name, value)]).unwrap();
@@ -312,6 +314,7 @@ mod tests {
             ("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp"),
             ("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp"),
             ("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4"),
+            ("FASTDDS_BUILTIN_TRANSPORTS", "DEFAULT"),
         ] {
             assert!(read(&[(name, value)]).unwrap().warnings().is_empty(), "{name}={value}");
         }

@@ -116,15 +116,27 @@ async fn receive_clock(subscription: TopicInput<Clock>, node: Node, followed: Fo
     let name = &subscription.name;
     // Nodes of this package, whose clock never jumps ahead.
     let mut machines = HashSet::new();
+    // Number of publishers at the last poll.
+    let mut clocks = 0;
     let mut has_warned = false;
     let mut timer = tokio::time::interval(POLL_PERIOD);
     let mut messages = std::pin::pin!(subscription.messages());
     loop {
         tokio::select! {
             _ = timer.tick() => {
-                let publishers = node.get_publishers_info().into_iter();
-                let of_machines = publishers.filter(|info| info.topic_type == MACHINE_TYPE);
+                let publishers = node.get_publishers_info();
+                let of_machines = publishers.iter().filter(|info| info.topic_type == MACHINE_TYPE);
                 machines = of_machines.map(|info| prefix_of(&info.endpoint_gid)).collect();
+                let found = publishers_of(name, &publishers, &machines);
+                if found.len() > clocks.max(1) && lock(&followed).is_some() {
+                    warn!(
+                        "{name}: {} publishers, of {}; each change between their times is a jump, which stops the axes: \
+                         end all but one",
+                        found.len(),
+                        found.join(", ")
+                    );
+                }
+                clocks = found.len();
             }
             Some(received) = messages.next() => match received {
                 Ok((message, info)) => match valid_time(&message.clock) {
@@ -145,6 +157,23 @@ async fn receive_clock(subscription: TopicInput<Clock>, node: Node, followed: Fo
             },
         }
     }
+}
+
+/// Returns the nodes of the publishers of the topic `name`, one for each publisher; one of `machines` counts once, since for a
+/// while it has two publishers of a topic.
+fn publishers_of(
+    name: &str,
+    publishers: &[TopicEndpointInfo],
+    machines: &HashSet<GuidPrefix>,
+) -> Vec<String> {
+    let mut counted = HashSet::new();
+    let of_clock = publishers.iter().filter(|info| info.topic_name.as_deref() == Some(name));
+    let of_clock = of_clock.filter(|info| {
+        let prefix = prefix_of(&info.endpoint_gid);
+        !machines.contains(&prefix) || counted.insert(prefix)
+    });
+    let node = |info: &TopicEndpointInfo| info.node_name.clone().unwrap_or("another participant".to_owned());
+    of_clock.map(node).collect()
 }
 
 /// Returns a time in ns; `None` before the epoch or with a whole second of nanoseconds.

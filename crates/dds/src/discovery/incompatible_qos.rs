@@ -4,7 +4,8 @@
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
-use rustdds::{DomainParticipant, DomainParticipantStatusEvent, QosPolicies};
+use rustdds::policy::Liveliness;
+use rustdds::{DomainParticipant, DomainParticipantStatusEvent, GUID, QosPolicies};
 use tracing::warn;
 
 use super::node_names::NodeNames;
@@ -33,24 +34,33 @@ pub(super) fn log(
     names: &NodeNames,
     own: &OwnSubscriptions,
 ) {
-    use DomainParticipantStatusEvent::{RemoteReaderQosIncompatible, RemoteWriterQosIncompatible};
-    let (guid, offered, requested, topic, what) = match event {
-        RemoteReaderQosIncompatible { remote_reader, requested_qos, offered_qos, .. } => {
-            let readers = participant.discovered_readers().into_iter();
-            let mut readers = readers.filter(|one| one.reader_proxy.remote_reader_guid == *remote_reader);
-            let topic = readers.next().map(|one| one.subscription_topic_data.topic_name().clone());
-            (remote_reader, offered_qos, requested_qos, topic, "subscription")
+    use DomainParticipantStatusEvent as Event;
+    let reader = |guid: &GUID| {
+        let readers = participant.discovered_readers().into_iter();
+        let mut readers = readers.filter(|one| one.reader_proxy.remote_reader_guid == *guid);
+        readers.next().map(|one| one.subscription_topic_data)
+    };
+    let (guid, policy, topic, what) = match event {
+        Event::RemoteReaderQosIncompatible { remote_reader, requested_qos, offered_qos, .. } => {
+            let topic = reader(remote_reader).map(|data| data.topic_name().clone());
+            (remote_reader, failed_policy(offered_qos, requested_qos), topic, "subscription")
         }
-        RemoteWriterQosIncompatible { remote_writer, requested_qos, offered_qos, .. } => {
+        Event::RemoteWriterQosIncompatible { remote_writer, requested_qos, offered_qos, .. } => {
             let writers = participant.discovered_writers().into_iter();
             let mut writers = writers.filter(|one| one.writer_proxy.remote_writer_guid == *remote_writer);
             let topic = writers.next().map(|one| one.publication_topic_data.topic_name);
-            (remote_writer, offered_qos, requested_qos, topic, "publisher")
+            (remote_writer, failed_policy(offered_qos, requested_qos), topic, "publisher")
         }
+        // RustDDS matches any kind of liveliness (docs/internals/upstream-reports.md).
+        Event::RemoteReaderMatched { remote_reader, .. } => match reader(remote_reader) {
+            Some(data) if is_manual(&data.qos()) => {
+                (remote_reader, "liveliness".to_owned(), Some(data.topic_name().clone()), "subscription")
+            }
+            _ => return,
+        },
         _ => return,
     };
     let topic = topic.unwrap_or_default();
-    let policy = failed_policy(offered, requested);
     if what == "publisher" && policy == "durability" && own.has_several(&topic) {
         return;
     }
@@ -61,6 +71,11 @@ pub(super) fn log(
         topic.strip_prefix("rt").unwrap_or(&topic),
         node.map_or("another participant".to_owned(), |name| format!("node {name}"))
     );
+}
+
+/// Returns true for a kind of liveliness that no writer of this node offers: theirs is automatic.
+fn is_manual(requested: &QosPolicies) -> bool {
+    requested.liveliness().is_some_and(|liveliness| !matches!(liveliness, Liveliness::Automatic { .. }))
 }
 
 /// Returns the name of the first policy that is offered worse than requested, as in the QoS parameters.

@@ -121,11 +121,12 @@ pub(crate) async fn run(participant: &DomainParticipant, range: DiscoveryRange, 
     loop {
         tokio::select! {
             event = events.next() => match event {
-                Some(DomainParticipantStatusEvent::RemoteReaderMatched { local_writer, .. }) => {
+                Some(event @ DomainParticipantStatusEvent::RemoteReaderMatched { local_writer, .. }) => {
                     // The writer of a rotated topic is not in the list.
                     if !findings.matched.record_match(local_writer) {
                         findings.matched.poll(participant);
                     }
+                    incompatible_qos::log(&event, participant, &findings.names, &findings.subscriptions);
                 }
                 Some(DomainParticipantStatusEvent::RemoteWriterMatched { local_reader, remote_writer }) => {
                     if let Some(requests) = &mut heartbeats {
