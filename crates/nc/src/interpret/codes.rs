@@ -135,7 +135,7 @@ codes! {
         ToolChange116 = 1160 in OKUMA, "G116: tool change";
     }
     pattern: HolePattern, "Holes of the canned cycle in a pattern" {
-        Circle = 700 in HAAS, "G70: on a circle about the position";
+        Circle = 700 in HAAS | OKUMA, "G70: on a circle about the position";
         Arc = 710 in HAAS, "G71: on an arc about the position";
         Row = 720 in HAAS, "G72: in a row from the position";
     }

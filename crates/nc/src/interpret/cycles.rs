@@ -33,12 +33,16 @@ impl State {
 
     /// Executes the holes of a pattern of Haas with the cycle of its line or that in effect: L holes at the radius I from
     /// the angle J on (G70 with equal distances, G71 K degrees apart; a negative I turns clockwise), or at distances I
-    /// from the position along the angle J (G72).
+    /// from the position along the angle J (G72). BHC of Okuma is G70 with K holes.
     pub(super) fn hole_pattern(&mut self, block: &mut LineWords, pattern: HolePattern) -> Outcome<()> {
-        let name = g_name(pattern.number());
+        let (name, number) = match self.dialect {
+            Dialect::Okuma => ("BHC".to_owned(), 'K'),
+            _ => (g_name(pattern.number()), 'L'),
+        };
         let Some(code) = self.modal.motion.filter(|code| is_canned(*code)) else {
             return Err(format!(
-                "{name} requires a canned cycle, as in G81 Z-5. R1. F100. L0 in a line before"
+                "{name} requires a canned cycle in a line before, as in {}",
+                if number == 'K' { "NCYL G81 Z-5 R1 F100" } else { "G81 Z-5. R1. F100. L0" }
             ));
         };
         let mut required = |letter: char, what: &str| {
@@ -50,8 +54,9 @@ impl State {
             HolePattern::Circle | HolePattern::Row => 0.0,
         };
         let angle = block.take('J').unwrap_or(0.0) * DEGREE;
-        let count =
-            block.take_integer('L')?.ok_or_else(|| format!("{name} requires L, the number of holes"))?;
+        let count = block
+            .take_integer(number)?
+            .ok_or_else(|| format!("{name} requires {number}, the number of holes"))?;
         if f64::from(count) > MAX_PECKS {
             return Err(format!("{name}: {count} holes; at most {MAX_PECKS} are allowed"));
         }

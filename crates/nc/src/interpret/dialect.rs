@@ -1,5 +1,6 @@
 //! Dialects of G code, and their detection from the content of a program.
 
+use std::collections::HashSet;
 use std::fmt;
 use std::io::{BufRead, Seek, SeekFrom};
 use std::path::Path;
@@ -211,8 +212,8 @@ pub(super) fn foreign_format(line: &str) -> Option<&'static str> {
 #[derive(Debug, Clone, Default)]
 struct Score {
     points: u32,
-    /// Rules that have counted, as bits.
-    rules: u128,
+    /// Rules that have counted, by their indices.
+    rules: HashSet<usize>,
     /// Points of the text.
     strongest: u32,
     text: Option<(String, usize)>,
@@ -391,6 +392,9 @@ const RULES: &[(u8, u32, Pattern)] = &[
     (MARLIN, 3, Code("M104S")),
     (MARLIN, 3, Code("M106S")),
     (MARLIN, 3, Code("M140S")),
+    // Units and arc centers in a line, as posts of Vectric write them.
+    (MACH3, 6, Code("G70G91.1")),
+    (MACH3, 6, Code("G71G91.1")),
     (MACH3, 6, Comment("MACH3")),
     (MACH3, 6, Comment("MACH2")),
     (MACH3, 6, Comment("MACH4")),
@@ -425,11 +429,9 @@ fn add_evidence(line: &str, number: usize, scores: &mut [Score; Dialect::ALL.len
     for (index, (dialects, points, pattern)) in RULES.iter().enumerate() {
         let Some(text) = pattern.text_in(line, &code, number) else { continue };
         for (dialect, score) in Dialect::ALL.into_iter().zip(scores.iter_mut()) {
-            if dialects & (1 << dialect as u8) == 0 || score.rules & (1 << index) != 0 {
-                continue;
+            if dialects & (1 << dialect as u8) != 0 && score.rules.insert(index) {
+                score.add(*points, text, number);
             }
-            score.rules |= 1 << index;
-            score.add(*points, text, number);
         }
     }
 }
@@ -601,6 +603,9 @@ mod tests {
             ("1 BEGIN PGM A MM\n2 FN 0: Q1=5\n", ("linuxcnc", None)),
             ("(post: grbl)\nG0 X1\n", ("grbl", Some(1))),
             ("(Mach3 mill)\nG0 X1\n", ("mach3", Some(1))),
+            ("N10G00G21G17G90G40G49G80\nN20G71G91.1\nN30T1M06\n", ("mach3", Some(2))),
+            ("G20\nG70 G91.1\n", ("mach3", Some(2))),
+            ("G20\nG91.1\n", ("linuxcnc", None)),
             ("$PART.MIN%\nG0 X1\n", ("okuma", Some(1))),
             ("O1001\nG15 H1\nG56 Z10. H1\n", ("okuma", Some(2))),
             ("G56 G43 H3 G0 X10\nM2\n", ("linuxcnc", None)),

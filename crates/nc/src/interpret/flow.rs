@@ -440,7 +440,8 @@ impl<R: BufRead + Seek> Interpreter<R> {
         }
         let text = subprogram_file(&self.state.options, label)?;
         let text = text.ok_or_else(|| {
-            format!("O{label}: no such subprogram in this file, and no file with its name beside it")
+            let name = if self.state.dialect == Dialect::Okuma { &label.to_uppercase() } else { label };
+            format!("O{name}: no such subprogram in this file, and no file with its name beside it")
         })?;
         let start = self.source.add_file(text)?;
         let mut found = self.find_subprograms(start)?;

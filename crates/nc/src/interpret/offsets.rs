@@ -153,6 +153,11 @@ impl State {
         let system = number.filter(|number| *number <= WORK_OFFSET_COUNT);
         let system = system.ok_or("G10 requires P, the coordinate system 1 to 9, or 0 for the active one")?;
         if system == 0 && is_macro_b {
+            let words = self.take_axes(block)?;
+            if words.iter().any(Option::is_some) && words.iter().flatten().all(|value| *value == 0.0) {
+                // The external work offset is 0.
+                return Ok(());
+            }
             return Err("G10 L2 P0, the external work offset, is not supported: add it to the work offsets"
                 .to_owned());
         }

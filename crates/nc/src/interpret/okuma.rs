@@ -16,8 +16,8 @@ const NAME_BASE: u32 = 37;
 const MAX_NAME: usize = 6;
 /// Prefix of the parameters of variables.
 pub(super) const PREFIX: &str = "_v_";
-/// Words of the graphics and the control without effect on the motion, at the start of a line.
-const WITHOUT_EFFECT: [&[u8]; 5] = [b"draw", b"clear", b"def", b"nomsg", b"pset"];
+/// Words of the graphics, the output and the control without effect on the motion, at the start of a line.
+const WITHOUT_EFFECT: [&[u8]; 7] = [b"draw", b"clear", b"def", b"nomsg", b"pset", b"put", b"write"];
 const FUNCTIONS: [&[u8]; 13] = [
     b"sin", b"cos", b"tan", b"asin", b"acos", b"atan", b"sqrt", b"abs", b"fix", b"fup", b"round", b"exp",
     b"ln",
@@ -100,6 +100,12 @@ pub(super) fn translate(line: &mut Vec<u8>) -> Outcome<Option<u32>> {
         }
         _ if first.first() == Some(&b'o') && is_name(&first[1..]) => line.extend_from_slice(first),
         _ if WITHOUT_EFFECT.contains(&first) => line.extend_from_slice(first),
+        _ if text.starts_with(b"put'") => line.extend_from_slice(b"put"),
+        // The pattern of the canned cycle in effect.
+        _ if text.starts_with(b"bhc") => {
+            line.extend_from_slice(b"g70");
+            words(&text[3..], line)?;
+        }
         _ if text.starts_with(b"if") => condition(&text[2..], line)?,
         _ if text.starts_with(b"goto") => jump(&text[4..], line)?,
         _ => words(text, line)?,
@@ -109,6 +115,12 @@ pub(super) fn translate(line: &mut Vec<u8>) -> Outcome<Option<u32>> {
         line.extend_from_slice(b"l0");
     }
     Ok(number)
+}
+
+/// Returns the axis whose upper travel limit is the variable `name`: `vpplz`.
+pub(super) fn limit_axis(name: &str) -> Option<usize> {
+    let [letter] = name.strip_prefix("vppl")?.as_bytes() else { return None };
+    AXES.iter().position(|axis| axis == letter)
 }
 
 /// Returns the name of a line by its number.
@@ -194,8 +206,8 @@ fn words(text: &[u8], out: &mut Vec<u8>) -> Outcome<()> {
         if name.len() == 1 || text[at..].iter().take_while(|byte| byte.is_ascii_alphabetic()).count() == 1 {
             out.push(byte);
             at += 1;
-            if text.get(at) == Some(&b'=') {
-                at += 1;
+            if follows(text, at, b'=') {
+                skip_assignment(text, &mut at);
                 out.push(b'[');
                 expression(text, &mut at, out, 0)?;
                 out.push(b']');
@@ -231,10 +243,7 @@ fn setting(text: &[u8], at: &mut usize, out: &mut Vec<u8>) -> Outcome<()> {
             )),
         };
     }
-    while text[*at] != b'=' {
-        *at += 1;
-    }
-    *at += 1;
+    skip_assignment(text, at);
     if follows(text, *at, b'\'') {
         // A text for the operator.
         *at = text.len();
@@ -243,6 +252,14 @@ fn setting(text: &[u8], at: &mut usize, out: &mut Vec<u8>) -> Outcome<()> {
     }
     out.push(b'=');
     expression(text, at, out, 0)
+}
+
+/// Moves behind the `=` that follows.
+fn skip_assignment(text: &[u8], at: &mut usize) {
+    while text[*at] != b'=' {
+        *at += 1;
+    }
+    *at += 1;
 }
 
 /// Returns true if `byte` is next, after blanks.
@@ -392,6 +409,10 @@ mod tests {
             ("VC[VC1+1] = VZOFZ[2] + 5", "#[50000+[#50001+1]]=#[60002+20*[2]]+5"),
             ("NCYL G81 Z=ZP-2 R3 M54", "g81z[#<_v_zp>-2]r3m54l0"),
             ("G56 HA Z100", "g56h#4120z100"),
+            ("G1 X = -1.0 F = VC1", "g1x[-1.0]f[#50001]"),
+            ("BHC X=XPOS Y5 I35 J45 K4", "g70x[#<_v_xpos>]y5i35j45k4"),
+            ("PUT 'EVENT=1 '", "put"),
+            ("PUT VC5,6,0", "put"),
             ("G15 H=VC32", "g15h[#50032]"),
             ("IF [ VTLCN EQ 5 ] N25", "if[#4120eq5]goto25"),
             ("IF [VC1EQ2] GOTO N7", "if[#50001eq2]goto7"),
@@ -413,6 +434,6 @@ mod tests {
         assert_eq!(text, "t2");
         assert_eq!(number.map(line_name).as_deref(), Some("XT2"));
         assert_eq!(translated("N100G0").1, Some(100));
-        assert!(translate(&mut b"bhc x0 y0".to_vec()).is_err());
+        assert!(translate(&mut b"laa x0 y0 i25".to_vec()).is_err());
     }
 }

@@ -449,11 +449,22 @@ impl State {
             && self.dialect == Dialect::Okuma
         {
             // Variables of the control begin with V.
-            let missing =
-                || format!("{}: the variable has no value: set it before it is used", name.to_uppercase());
+            let shown = name.to_uppercase();
+            if let Some(axis) = okuma::limit_axis(name) {
+                let missing = || format!("{shown}: the machine has no such travel limit");
+                return self.upper_limit(axis).ok_or_else(missing);
+            }
+            let missing = || format!("{shown}: the variable has no value: set it before it is used");
             return name.starts_with('v').then_some(0.0).ok_or_else(missing);
         }
         value.ok_or_else(|| format!("#<{name}> has no value: set it before it is used"))
+    }
+
+    /// Returns the upper travel limit of an axis in the coordinates in effect and units of the program.
+    fn upper_limit(&self, axis: usize) -> Option<f64> {
+        let origin = if self.modal.is_machine { 0.0 } else { self.origin(axis) };
+        let limit = self.options.upper_limits[axis];
+        limit.is_finite().then(|| (limit - origin) / self.unit(axis))
     }
 
     /// Returns true if `#<name>` has a value.

@@ -152,6 +152,8 @@ fn additional_work_offsets_and_tool_data_are_set_by_the_program() {
         [4.0, 8.0, 5.0],
     ];
     assert_ends(Dialect::Fanuc, text, &expected);
+    // The external work offset is 0 before, too.
+    assert_ends(Dialect::Fanuc, "O1\nG90 G10 L2 P0 X0. Y0. Z0. B0.\nG0 X5.\nM30\n", &[[5.0, 0.0, 0.0]]);
     let text = "%\nO2\nG154 P2 G0 X1.\nG111 X2.\nG110 X3.\nM30\n%";
     let mut options = options(Dialect::Haas);
     options.work_offsets[10][0] = 0.1;
@@ -412,6 +414,7 @@ fn alarms_and_missing_lines_are_rejected() {
         ),
         ("O1\nG65 A1.\n", "part.nc:2: G65 requires P, the number of the macro"),
         ("O1\nG70 I5. L4\n", "part.nc:2: G70 requires a canned cycle"),
+        ("O1\nG10 L2 P0 X0. Z-1.\n", "part.nc:2: G10 L2 P0, the external work offset, is not supported"),
         ("O1\nG81 Z-1. R1. F100. L0\nG71 I5. L4\n", "part.nc:3: G71 requires K, the angle between the holes"),
         (
             "O1\nG81 Z-1. R1. F100. L0\nG70 I5. L99999\n",

@@ -39,6 +39,17 @@ fn programs_run_in_their_detected_dialects() {
             "(Mach3 router post)\nG20 G90 G40 G49 G80\nG70\nM6 T1 ' quarter inch\nG0 X1. Y0\nG12 I0.5 F30\nM5 M30\n",
             [25.4, 0.0, 0.0],
         ),
+        // Units and arc centers as a post of Vectric writes them, without the name of the control.
+        (
+            Mach3,
+            "( Profile )\nN10G00G20G17G90G40G49G80\nN20G70G91.1\nN30T1M06\nN40X1.0000Y2.0000F60.0\nN50M30\n%\n",
+            [25.4, 50.8, 0.0],
+        ),
+        (
+            Mach3,
+            "N10G00G21G17G90G40G49G80\nN20G71G91.1\nN30G1X1F60\nN40G3X3Y0I1J0\nN50M30\n",
+            [3.0, 0.0, 0.0],
+        ),
         (
             Mach3,
             "; Mach3\nG21\nG68 A0 B0 R90\nG0 X10 Y0\nG69\nG51 X2 Y3\nG0 X1 Y1\nG50\nM30\n",

@@ -79,6 +79,47 @@ fn ncyl_positions_and_stores_the_cycle() {
     }
 }
 
+/// Three holes at the radius 10 about (20, 10), counterclockwise from 30° on.
+#[test]
+fn a_bolt_circle_repeats_the_cycle_in_effect() {
+    let text =
+        "$A.MIN%\nG15 H1\nG0 X0 Y0 Z10\nNCYL G81 Z-3 R1 F100 M54\nBHC X20 Y10 I10 J30 K3\nX0 Y0\nG80\nM2\n";
+    let holes = [30_f64, 150.0, 270.0].map(|angle| {
+        let (sine, cosine) = angle.to_radians().sin_cos();
+        [120.0 + 10.0 * cosine, 60.0 + 10.0 * sine]
+    });
+    let mut expected = vec![[100.0, 50.0, 10.0]];
+    let mut level = 10.0;
+    for [x, y] in [holes[0], holes[1], holes[2], [100.0, 50.0]] {
+        let hole = [level, 1.0, -3.0, 1.0].map(|z| [x, y, z]);
+        expected.extend(if level > 1.0 { &hole[..] } else { &hole[1..] });
+        level = 1.0;
+    }
+    assert_ends(text, &expected);
+}
+
+#[test]
+fn a_retraction_to_the_travel_limit_ends_there_in_each_system() {
+    let text =
+        "O7\nG15 H1\nT1 M6\nG0 G56 HA Z20\nX1 Y1\nG1 Z-2 F100\nG0 Z=VPPLZ\nG15 H0\nG0 X = VPPLX-1\nM2\n";
+    assert_ends(
+        text,
+        &[
+            [0.0, 0.0, 70.0],
+            [101.0, 51.0, 70.0],
+            [101.0, 51.0, 48.0],
+            [101.0, 51.0, 500.0],
+            [499.0, 51.0, 500.0],
+        ],
+    );
+}
+
+#[test]
+fn output_to_a_printer_moves_no_axis() {
+    let text = "$A.MIN%\nPUT 'EVENT/1 X=5'\nPUT'A'\nPUT VC5,6,0\nWRITE C\nG0 X = 1 Y= 2 Z =3\nM2\n";
+    assert_ends(text, &[[101.0, 52.0, 3.0]]);
+}
+
 #[test]
 fn variables_conditions_and_named_lines_make_a_loop() {
     // Three steps of 4 mm, then the square root of 81 along Y.
@@ -177,12 +218,17 @@ fn cutter_compensation_takes_the_radius_of_the_active_tool() {
 fn wrong_lines_are_rejected() {
     for (text, expected) in [
         ("$A.MIN%\nGOTO NX\n", "part.nc:2: NX: no such line in the program that runs"),
-        ("$A.MIN%\nBHC X0 Y0 I10 J0 K4\n", "part.nc:2: BHC is not supported in the dialect okuma"),
+        ("$A.MIN%\nLAA X0 Y0 I10 J0\n", "part.nc:2: LAA is not supported in the dialect okuma"),
+        (
+            "$A.MIN%\nBHC X0 Y0 I10 J0 K4\n",
+            "part.nc:2: BHC requires a canned cycle in a line before, as in NCYL G81 Z-5 R1 F100",
+        ),
+        ("$A.MIN%\nG81 Z-5 R1 F9\nBHC I10 J0\n", "part.nc:3: BHC requires K, the number of holes"),
         (
             "$A.MIN%\nG0 X=DIA\n",
             "part.nc:2: word X: DIA: the variable has no value: set it before it is used",
         ),
-        ("$A.MIN%\nCALL OXY\n", "part.nc:2: Oxy: no such subprogram in this file"),
+        ("$A.MIN%\nCALL OXY\n", "part.nc:2: OXY: no such subprogram in this file"),
         ("$A.MIN%\nVC1=#8G\n", "part.nc:2: #8G: a hexadecimal number is required, as in #81H"),
         (
             "$A.MIN%\nCALL OO88 PH=1 PC=90\n",
