@@ -152,13 +152,10 @@ PARTICIPANTS = 20_000
 SENDING_S = 10.0
 
 
-RECOVERY_S = 240.0
-"""Largest time until samples and responses come again, s; a busy machine takes more than a minute."""
-
 
 @pytest.mark.extended
 def test_forged_participants_do_not_stop_the_axes() -> None:
-    """The axes follow their trajectory, though samples come late or are lost; then services respond again."""
+    """No position cycle is lost and services respond; a participant that joins afterwards is served."""
     speed = 0.05 / 60.0
     with first_participant() as node, AxesClient(process=node) as drive:
         drive.accept(joint_trajectory(["x"], [0.0, 60.0], [[0.0], [60.0 * speed]]), 10)
@@ -171,31 +168,23 @@ def test_forged_participants_do_not_stop_the_axes() -> None:
                 time.sleep(max(0.0, begin + SENDING_S * (index + 1) / PARTICIPANTS - time.monotonic()))
         sent = time.monotonic()
         end = began + round((sent - begin) * NANOSECONDS)
-        drive.wait_until(end, RECOVERY_S)
+        drive.wait_until(end, 30.0)
         late = time.monotonic() - sent
-        while True:
-            try:
-                drive.get_parameters(["x.position_loop.gain"])
-                break
-            except TimeoutError:
-                assert time.monotonic() < sent + RECOVERY_S
+        drive.get_parameters(["x.position_loop.gain"])
         responds = time.monotonic() - sent
-        recovered = drive.now()
-        drive.wait_until(recovered, RECOVERY_S)
-        joints = drive.record(began, recovered).joints
-        cycles = round((joints.stamp[-1] - began) / TSP_NS) + 1
-        print(
-            f"\nlate: samples {late:.1f} s, services {responds:.1f} s; "
-            f"lost: {cycles - len(joints.stamp)} of {cycles} samples; {before:.0f} to {peak_mb(node.pid):.0f} MB"
-        )
-        # Samples come again, and at constant speed the axis is at each stamp as far as the trajectory.
-        assert joints.stamp[0] == began and joints.stamp[-1] > end - TSP_NS
-        steady = (joints.stamp > began + NANOSECONDS) & (joints.stamp < began + 59 * NANOSECONDS)
-        stamp, position = joints.stamp[steady], joints["position", "x"][steady]
+        print(f"\nlate: samples {late:.1f} s, services {responds:.1f} s; {before:.0f} to {peak_mb(node.pid):.0f} MB")
+        joints = drive.record(began, end).joints
+        stamps = joints.stamp
+        assert len(stamps) == round((stamps[-1] - stamps[0]) / TSP_NS) + 1
+        assert stamps[0] == began and stamps[-1] > end - TSP_NS
+        # At constant speed, the axis is at each stamp as far as the trajectory.
+        steady = stamps > began + NANOSECONDS
+        stamp, position = stamps[steady], joints["position", "x"][steady]
         advance = (position - position[0]) - speed * (stamp - stamp[0]) / NANOSECONDS
         assert abs(advance).max() < 0.1 * speed * TSP_NS / NANOSECONDS
         assert peak_mb(node.pid) < MAX_MB
-        drive.stop(60.0)
+        assert "new participants" in node.output()
+        drive.stop(30.0)
 
 
 def mutated(datagram: bytes, choice: random.Random) -> bytes:

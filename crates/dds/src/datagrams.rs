@@ -1,12 +1,13 @@
 //! Filter of the datagrams of the middleware.
 //!
 //! A program that receives and sends by these functions in place of `recvmsg` and `sendto`, as `virtual_axes_node` does, has
-//! the bounds of `defects::datagram_bounds` and `hosts`, and the history of `defects::late_readers`.
+//! the bounds of `defects::datagram_bounds`, `defects::participant_flood` and `hosts`, and the history of
+//! `defects::late_readers`.
 
 use std::net::Ipv4Addr;
 use std::time::Instant;
 
-use crate::defects::{datagram_bounds, late_readers};
+use crate::defects::{datagram_bounds, late_readers, participant_flood};
 use crate::hosts;
 
 /// Beginning of each datagram of RTPS.
@@ -19,7 +20,7 @@ pub fn receive(buffer: &mut [u8], length: usize, source: Ipv4Addr) -> Option<usi
         return Some(length);
     }
     let now = Instant::now();
-    if !hosts::may_receive(source, now) {
+    if !hosts::may_receive(source, now) || !participant_flood::may_receive(&buffer[..length], now) {
         return None;
     }
     let length = datagram_bounds::bound(buffer, length, source, now)?;

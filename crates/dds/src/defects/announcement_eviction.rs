@@ -23,9 +23,9 @@ use std::net::{Ipv4Addr, UdpSocket};
 
 use rustdds::{DomainParticipant, RTPSEntity};
 
-use super::dispose::{DISPOSED_AND_UNREGISTERED, PID_STATUS_INFO, SPDP_WRITER};
+use super::dispose::{DISPOSED_AND_UNREGISTERED, PID_STATUS_INFO};
 use crate::rtps::discovery_message::discovery_port;
-use crate::rtps::{Data, Guid, Message, PL_CDR_LE, is_secured};
+use crate::rtps::{Data, Guid, Message, PARTICIPANTS_WRITER, PL_CDR_LE, is_secured};
 
 /// Number of announcements that RustDDS 0.15 keeps.
 const CACHED_ANNOUNCEMENTS: i64 = 64;
@@ -73,7 +73,7 @@ fn nonexistent(own: &Guid) -> Guid {
 fn datagram(guid: &Guid, sequence_number: i64) -> Vec<u8> {
     let key = [PID_PARTICIPANT_GUID.as_slice(), guid, &PID_SENTINEL].concat();
     Message::from_participant(guid).key(&Data {
-        writer: SPDP_WRITER,
+        writer: PARTICIPANTS_WRITER,
         sequence_number,
         inline_qos: &[(PID_STATUS_INFO, &DISPOSED_AND_UNREGISTERED)],
         payload: Some((&PL_CDR_LE, &key)),

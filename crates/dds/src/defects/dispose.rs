@@ -19,10 +19,8 @@ use rustdds::{DomainParticipant, RTPSEntity};
 
 use crate::environment::DiscoveryRange;
 use crate::rtps::discovery_message::DiscoveryMessage;
-use crate::rtps::{Data, EntityId, Guid, Message};
+use crate::rtps::{Data, EntityId, Guid, Message, PARTICIPANTS_WRITER};
 
-/// Built-in writer of participant announcements (RTPS 2.5, 9.3.1.3).
-pub(crate) const SPDP_WRITER: EntityId = [0x00, 0x01, 0x00, 0xc2];
 /// Built-in writer of writer announcements (RTPS 2.5, 9.3.1.3).
 const SEDP_PUBLICATIONS_WRITER: EntityId = [0x00, 0x00, 0x03, 0xc2];
 const PID_KEY_HASH: u16 = 0x0070;
@@ -37,7 +35,11 @@ const LAST_SEQUENCE_NUMBER: i64 = 1 << 32;
 /// participant has been dropped.
 pub(crate) fn of_participant(participant: &DomainParticipant, range: DiscoveryRange) -> DiscoveryMessage {
     let guid = participant.guid().to_bytes();
-    DiscoveryMessage::new(dispose_datagram(&guid, SPDP_WRITER, LAST_SEQUENCE_NUMBER), participant, range)
+    DiscoveryMessage::new(
+        dispose_datagram(&guid, PARTICIPANTS_WRITER, LAST_SEQUENCE_NUMBER),
+        participant,
+        range,
+    )
 }
 
 /// Returns the dispose message of one writer of `participant`.
@@ -72,7 +74,7 @@ mod tests {
     #[test]
     fn the_datagram_contains_the_key_hash_that_fast_dds_requires() {
         let guid: [u8; 16] = [1, 0x12, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0, 0, 1, 0xc1];
-        let datagram = dispose_datagram(&guid, SPDP_WRITER, LAST_SEQUENCE_NUMBER);
+        let datagram = dispose_datagram(&guid, PARTICIPANTS_WRITER, LAST_SEQUENCE_NUMBER);
         assert_eq!(&datagram[..8], b"RTPS\x02\x04\x01\x12");
         assert_eq!(datagram[8..20], guid[..12]);
         assert_eq!(datagram[20..24], [0x15, 0x03, 52, 0]);

@@ -59,9 +59,6 @@ const BUILT_IN: u8 = 0xf0;
 const PERIOD: Duration = Duration::from_millis(150);
 /// Number of repetitions of a request.
 const REPETITIONS: u32 = 6;
-/// Largest number of requests that wait: with more participants at a time, the later ones repeat their announcements by
-/// themselves.
-const MAX_WAITING: usize = 128;
 /// Count of the messages: the first one that Fast DDS and RustDDS do not take for a duplicate.
 const COUNT: u32 = 1;
 
@@ -106,8 +103,7 @@ impl HeartbeatRequests {
 
     /// Records a participant that has just been discovered.
     pub(crate) fn add_participant(&mut self, other: GUID) {
-        let is_requested = self.queue.len() < MAX_WAITING && other.to_bytes()[..2] == VENDOR_FAST_DDS;
-        if is_requested && !is_secured() {
+        if !is_secured() && other.to_bytes()[..2] == VENDOR_FAST_DDS {
             self.queue.push_back((Instant::now() + PERIOD, Request::Participant(other), 0));
         }
     }
@@ -282,17 +278,6 @@ mod tests {
         assert_eq!(datagram.len(), 36 + 2 * 28);
         assert_eq!(datagram[36..48], [0x06, 1, 24, 0, 0, 0, 3, 0xc7, 0, 0, 3, 0xc2]);
         assert_eq!(datagram[64..76], [0x06, 1, 24, 0, 0, 0, 4, 0xc7, 0, 0, 4, 0xc2]);
-    }
-
-    #[test]
-    fn a_flood_of_participants_does_not_become_a_flood_of_requests() {
-        let mut requests = HeartbeatRequests::open().unwrap();
-        for index in 0..20_000_u32 {
-            let mut guid = WRITER;
-            guid[8..12].copy_from_slice(&index.to_be_bytes());
-            requests.add_participant(GUID::from_bytes(guid));
-        }
-        assert_eq!(requests.queue.len(), MAX_WAITING);
     }
 
     #[test]

@@ -10,6 +10,7 @@ pub(crate) mod dispose;
 pub(crate) mod heartbeat_request;
 pub(crate) mod large_response;
 pub(crate) mod late_readers;
+pub(crate) mod participant_flood;
 pub(crate) mod reception_order;
 pub(crate) mod returned_participants;
 mod stalled_readers;

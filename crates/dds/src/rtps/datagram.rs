@@ -1,9 +1,10 @@
 //! Submessages of a received datagram, without their meaning.
 
 use super::{
-    EntityId, FLAG_DATA, FLAG_INLINE_QOS, FLAG_LITTLE_ENDIAN, Guid, PID_DURABILITY, PID_ENDPOINT_GUID,
-    PID_SENTINEL, PID_TOPIC_NAME, SUBMESSAGE_DATA_FRAG, SUBMESSAGE_GAP, SUBMESSAGE_INFO_DST,
-    SUBMESSAGE_INFO_SRC, SUBMESSAGE_INFO_TS, SUBMESSAGE_PAD, SUBSCRIPTIONS_WRITER, sequence_number,
+    EntityId, FLAG_DATA, FLAG_INLINE_QOS, FLAG_LITTLE_ENDIAN, Guid, PARTICIPANTS_WRITER, PID_DURABILITY,
+    PID_ENDPOINT_GUID, PID_PARTICIPANT_GUID, PID_SENTINEL, PID_TOPIC_NAME, SUBMESSAGE_DATA,
+    SUBMESSAGE_DATA_FRAG, SUBMESSAGE_GAP, SUBMESSAGE_INFO_DST, SUBMESSAGE_INFO_SRC, SUBMESSAGE_INFO_TS,
+    SUBMESSAGE_PAD, SUBSCRIPTIONS_WRITER, sequence_number,
 };
 
 /// Length of the header of a message (9.4.4).
@@ -105,10 +106,11 @@ impl Submessage {
         octets.try_into().ok()
     }
 
-    /// Returns the reader that a DATA announces; `None` for other samples, and for one without the parameters.
-    pub(crate) fn announced_reader(&self, datagram: &[u8]) -> Option<ReaderAnnouncement> {
+    /// Returns the parameters of a DATA of the writer `writer` and whether their numbers are little-endian; `None` for other
+    /// submessages and other content.
+    fn announced<'a>(&self, datagram: &'a [u8], writer: EntityId) -> Option<(Vec<(u16, &'a [u8])>, bool)> {
         let flags = datagram[self.start - 3];
-        if self.entity(datagram, 8)? != SUBSCRIPTIONS_WRITER || flags & FLAG_DATA == 0 {
+        if self.kind != SUBMESSAGE_DATA || self.entity(datagram, 8)? != writer || flags & FLAG_DATA == 0 {
             return None;
         }
         // Offset from the end of the field (9.4.5.3).
@@ -119,7 +121,19 @@ impl Submessage {
         }
         let ([0, kind @ (2 | 3), _, _], list) = octets.split_first_chunk::<4>()? else { return None };
         let is_little_endian = *kind == 3;
-        let (list, _) = parameters(list, is_little_endian);
+        Some((parameters(list, is_little_endian).0, is_little_endian))
+    }
+
+    /// Returns the participant that a DATA announces; `None` for other samples, and for one without its identifier.
+    pub(crate) fn announced_participant(&self, datagram: &[u8]) -> Option<Guid> {
+        let (list, _) = self.announced(datagram, PARTICIPANTS_WRITER)?;
+        let (_, guid) = list.iter().find(|(id, _)| *id == PID_PARTICIPANT_GUID)?;
+        guid.first_chunk().copied()
+    }
+
+    /// Returns the reader that a DATA announces; `None` for other samples, and for one without the parameters.
+    pub(crate) fn announced_reader(&self, datagram: &[u8]) -> Option<ReaderAnnouncement> {
+        let (list, is_little_endian) = self.announced(datagram, SUBSCRIPTIONS_WRITER)?;
         let value = |id: u16| list.iter().find(|(found, _)| *found == id).map(|(_, value)| *value);
         let number = |octets: &[u8]| {
             let octets = *octets.first_chunk::<4>()?;

@@ -38,9 +38,12 @@ const FLAG_KEY: u8 = 0x08;
 const OCTETS_TO_INLINE_QOS: u16 = 16;
 /// Kind of a locator with an IPv4 address (9.3.2.3).
 const LOCATOR_UDP_V4: u32 = 1;
+/// Writer of the announcements of participants, SPDP (9.3.1.3).
+pub(crate) const PARTICIPANTS_WRITER: EntityId = [0, 1, 0x00, 0xc2];
 /// Writer of the announcements of readers, SEDP (9.3.1.5).
 const SUBSCRIPTIONS_WRITER: EntityId = [0, 0, 0x04, 0xc2];
 // Parameters of these announcements (9.6.4.9).
+const PID_PARTICIPANT_GUID: u16 = 0x0050;
 const PID_TOPIC_NAME: u16 = 0x0005;
 const PID_DURABILITY: u16 = 0x001d;
 const PID_ENDPOINT_GUID: u16 = 0x005a;
