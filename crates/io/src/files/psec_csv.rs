@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::error::FileError;
 use super::lines::{Lines, fields};
-use super::psec_error::{MAX_TIME, TIME, header_unit_hint, separator_hint, unit_hint};
+use super::psec_error::{MAX_TIME, MAX_VALUE, TIME, header_unit_hint, separator_hint, unit_hint};
 use super::psec_row::{PsecRow, TimeGap, TimeSteps};
 use super::recording::recorded_psec::RecordedPsec;
 use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
@@ -370,6 +370,12 @@ impl<R: Read> PsecCsvReader<R> {
             joint
                 .check_travel_limits(Some(after.index), position)
                 .map_err(|rejection| point_error(at(), &rejection))?;
+            // Of an axis without travel limits.
+            if position.abs() > MAX_VALUE {
+                let (name, position) = (&joint.name, Rounded(position));
+                let reason = format!("{name} is {position}, must lie in ±{MAX_VALUE:e} (m or rad)");
+                return Err(FileError::new(at(), reason));
+            }
         }
         if let Some(rows) = rows {
             let row = |line| PsecRow::new(line, after.time, &after.positions);

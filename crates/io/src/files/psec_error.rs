@@ -9,7 +9,7 @@ pub(super) const TIME: &str = "time";
 /// Maximum time, s: 100 h, as of part programs.
 pub(super) const MAX_TIME: f64 = 360_000.0;
 /// Largest magnitude of a value of a point, in SI units: beyond that of any axis.
-const MAX_VALUE: f64 = 1e9;
+pub(super) const MAX_VALUE: f64 = 1e9;
 
 /// Returns the index of the first point after [`MAX_TIME`] or with a value beyond [`MAX_VALUE`], with the reason of its
 /// rejection.

@@ -208,6 +208,13 @@ fn errors_name_file_line_and_column() {
         error("time,x\n0,0\n1,0.36\n"),
         "p.csv:3: x, point 1: position 0.36 m (360 mm) is outside the travel limits, -0.355 m (-355 mm) to 0.355 m (355 mm)"
     );
+    // C has no travel limits; the bound is that of trajectories in YAML.
+    for (text, value) in [("1e307", "1e307"), ("-1.1e9", "-1100000000")] {
+        assert_eq!(
+            error(&format!("time,c\n0,0\n0.006,{text}\n")),
+            format!("p.csv:3: c is {value}, must lie in ±1e9 (m or rad)")
+        );
+    }
 }
 
 #[test]
