@@ -23,6 +23,7 @@ use crate::input::CommandInput;
 use crate::input::must_not_replace;
 use crate::input::part_program::PartProgramArguments;
 use crate::output::interrupt;
+use crate::output::progress::Spinner;
 use compile_output::CompileOutput;
 
 /// Micrometer, m.
@@ -158,6 +159,10 @@ pub fn run(arguments: &CompileArguments) -> Result<String, Box<dyn Error>> {
         program: arguments.part_program.options()?,
     };
     let place = (arguments.input.as_str(), program_folder(&arguments.input, PROGRAMS));
+    let spinner = (!arguments.output.is_quiet()).then(Spinner::new);
+    if let Some(spinner) = &spinner {
+        spinner.set_activity(format!("compiling {}", arguments.input))?;
+    }
     let found = compile(&program.text, place, &plants, &options, &interrupt::check).map_err(
         |error| -> Box<dyn Error> {
             match error {
@@ -167,6 +172,7 @@ pub fn run(arguments: &CompileArguments) -> Result<String, Box<dyn Error>> {
             }
         },
     )?;
+    drop(spinner);
     if let Some(out) = &arguments.out {
         let mut file = OutputFile::create(out)?;
         file.write_all(&program.bytes(&found.text))?;
