@@ -84,6 +84,10 @@ def test_a_polar_plot_has_the_circular_deviation(ballbar: va.Run) -> None:
         deviation = line.get_ydata()
         assert deviation.max() == pytest.approx(expected["radial_deviation_um"]["max"], abs=1e-6)
         assert deviation.min() == pytest.approx(expected["radial_deviation_um"]["min"], abs=1e-6)
+    figure.canvas.draw()
+    numbers = [number.get_window_extent() for number in figure.axes[0].yaxis.get_ticklabels() if number.get_text()]
+    assert len(numbers) > 2
+    assert not any(inner.overlaps(outer) for inner, outer in zip(numbers, numbers[1:]))
     with pytest.raises(ValueError, match="it must be polar"):
         ballbar.plot_polar(ax=plt.subplots()[1])
 

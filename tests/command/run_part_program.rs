@@ -202,6 +202,17 @@ fn the_page_has_the_worst_line_and_the_feed_along_the_path() {
 }
 
 #[test]
+fn the_page_has_the_notes_of_the_program() {
+    let folder = TestFolder::new("part_program_page_notes");
+    let name = program(&folder, "G1 X1 F3000\nM1\nX2\nM2\n");
+    let page = folder.0.join("page.html");
+    let output = run(&["run", &name, "--report", page.to_str().expect("UTF-8")]);
+    assert!(output.status.success(), "{output:?}");
+    let page = fs::read_to_string(page).expect("a page");
+    assert!(page.contains("line 2: M0 and M1 stop the axes and do not wait"));
+}
+
+#[test]
 fn orientation_errors_of_lines_are_those_of_the_run() {
     let folder = TestFolder::new("part_program_orientation");
     let name = program(&folder, "G43.4 H1 G64 P0.05\nG1 X20 A5 F3000\nX40 A15 C30\nX60 A5 C90\nG49\nM2\n");

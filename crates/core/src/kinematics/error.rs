@@ -5,6 +5,12 @@ use thiserror::Error;
 use super::role::AxisRole;
 use crate::units::Rounded;
 
+/// Formats a vector for a message.
+fn rounded(vector: &[f64; 3]) -> String {
+    let [x, y, z] = vector.map(Rounded);
+    format!("[{x}, {y}, {z}]")
+}
+
 /// Rejection of a pose by the inverse kinematics.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum KinematicsError {
@@ -32,8 +38,8 @@ pub enum KinematicsError {
     },
     /// Tool axis that requires a missing rotary axis.
     #[error(
-        "tool axis {axis:?} is unreachable without a rotary axis {missing}; the nearest reachable direction differs by {} deg",
-        Rounded(.angle.to_degrees())
+        "tool axis {} is unreachable without a rotary axis {missing}; the nearest reachable direction differs by {} deg",
+        rounded(.axis), Rounded(.angle.to_degrees())
     )]
     AxisUnreachable {
         /// Tool axis.
@@ -45,8 +51,8 @@ pub enum KinematicsError {
     },
     /// Tip that requires a missing linear axis.
     #[error(
-        "tip {tip:?} m is unreachable without a linear axis {missing}, which would be at {} mm",
-        Rounded(.position * 1e3)
+        "tip {} m is unreachable without a linear axis {missing}, which would be at {} mm",
+        rounded(.tip), Rounded(.position * 1e3)
     )]
     TipUnreachable {
         /// Tip, m.

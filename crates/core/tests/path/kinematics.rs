@@ -333,9 +333,12 @@ fn without_a_only_the_tool_axis_plus_z_is_reachable() {
         let error = solve(&kinematics, &ToolPose { axis: Vector3::y(), ..pose }, &near).expect_err("no A");
         assert_eq!(
             error.to_string(),
-            "tool axis [0.0, 1.0, 0.0] is unreachable without a rotary axis a; the nearest reachable \
-             direction differs by 90 deg"
+            "tool axis [0, 1, 0] is unreachable without a rotary axis a; the nearest reachable direction differs by \
+             90 deg"
         );
+        let tilted = Vector3::new(0.0, -0.5, 0.75_f64.sqrt());
+        let error = solve(&kinematics, &ToolPose { axis: tilted, ..pose }, &near).expect_err("no A");
+        assert!(error.to_string().starts_with("tool axis [0, -0.5, 0.866025] is"), "{error}");
     }
 }
 

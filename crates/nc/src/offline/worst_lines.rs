@@ -154,6 +154,8 @@ pub struct ProgramFigures {
     pub worst_lines: Vec<WorstLine>,
     /// Lines with the largest contour errors at rapid traverse, the largest first.
     pub worst_rapids: Vec<WorstLine>,
+    /// Notes on dialect, assumptions and words without effect: line and text.
+    pub notes: Vec<(usize, String)>,
 }
 
 /// Place, feed and contour error of the tool tip in a position cycle.
@@ -573,6 +575,7 @@ impl LineErrors {
             rapids,
             worst_lines,
             worst_rapids,
+            notes: track.notes(),
         })
     }
 }

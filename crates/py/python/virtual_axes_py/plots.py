@@ -134,6 +134,8 @@ def plot_polar(run: Run, ax: Axes | None) -> Figure:
     if ax is not None and _axes(ax).name != "polar":
         raise ValueError(f"ax has the projection {ax.name!r}; it must be polar: plt.subplot(projection='polar')")
     panel: Any = _figure((7, 7)).add_subplot(projection="polar") if ax is None else ax
+    from matplotlib.ticker import MaxNLocator
+
     low, high = 0.0, 0.0
     for circle in circles:
         way = "counterclockwise" if circle.counterclockwise else "clockwise"
@@ -144,6 +146,8 @@ def plot_polar(run: Run, ax: Axes | None) -> Figure:
     panel.plot(np.linspace(0, 2 * np.pi, 361), np.zeros(361), "--", color="0.6", linewidth=1, label="nominal")
     panel.set_rlim(low - 0.1 * span, high + 0.1 * span)
     panel.set_rorigin(low - 2 * span)
+    # The ring is narrow: the numbers of more circles would overlap.
+    panel.set_rticks([tick for tick in MaxNLocator(4).tick_values(low, high) if low <= tick <= high])
     panel.set_title("radial deviation, µm")
     panel.legend(loc="lower right", fontsize="small")
     return _figure_of(panel)

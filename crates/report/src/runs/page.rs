@@ -121,6 +121,8 @@ fn facts(machine: &str, run: &SimulatedRun) -> Vec<(String, String)> {
     let warnings = run.axis_warnings().into_iter().chain(run.input_warnings.clone());
     facts.extend(warnings.map(|warning| ("warning".to_owned(), warning)));
     facts.extend(run.input_notes.iter().map(|note| ("note".to_owned(), note.clone())));
+    let program = run.part_program.iter().flat_map(|program| &program.figures.notes);
+    facts.extend(program.map(|(line, note)| ("note".to_owned(), format!("line {line}: {note}"))));
     facts.extend(run.changes.iter().map(|change| ("set".to_owned(), change.clone())));
     let moving = run.machine.axes().iter().zip(&figures.axes).filter(|(_, figures)| figures.moves);
     facts.extend(moving.map(|(axis, _)| (axis.name().to_owned(), values(axis))));
