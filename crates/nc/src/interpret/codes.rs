@@ -105,6 +105,8 @@ codes! {
         Probe383 = 383 in NGC, "G38.3: probing to the end of a straight line";
         Probe384 = 384 in NGC, "G38.4: probing to the end of a straight line";
         Probe385 = 385 in NGC, "G38.5: probing to the end of a straight line";
+        RigidTapping = 842 in FANUC, "G84.2: tapping";
+        LeftRigidTapping = 843 in FANUC, "G84.3: left-hand tapping";
         LeftTapping174 = 1740 in HAAS, "G174: left-hand tapping";
         Tapping184 = 1840 in HAAS, "G184: tapping";
         LeftTapping274 = 2740 in OKUMA, "G274: left-hand tapping";

@@ -390,6 +390,8 @@ fn is_tapping(code: Motion) -> bool {
         code,
         Motion::Tapping
             | Motion::LeftTapping
+            | Motion::RigidTapping
+            | Motion::LeftRigidTapping
             | Motion::Tapping184
             | Motion::LeftTapping174
             | Motion::Tapping284

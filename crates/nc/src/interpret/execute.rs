@@ -36,6 +36,14 @@ impl State {
             return self.spline_line(block);
         }
         self.moves_in_machine_coordinates = false;
+        if self.enters_parameters {
+            if block.g.is_empty() && block.m.is_empty() {
+                block.skip(ALL_LETTERS);
+                return Ok(());
+            }
+            // G11 ends the entry, and so does any other code.
+            self.enters_parameters = false;
+        }
         let has_mapping = block.has_any(&['A', 'B', 'C', 'Q', 'R']);
         let has_p0 = block.get('P') == Some(0.0);
         let codes = Codes::new(&block.g, &block.m, has_mapping, has_p0, self.dialect)?;

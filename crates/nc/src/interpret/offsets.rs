@@ -28,7 +28,11 @@ impl State {
         let Some(code) = codes.g.coordinates else { return Ok(()) };
         let of_code = block.g.iter().find(|code| (1100..=1290).contains(*code)).map(|code| code / 10 - 109);
         let is_additional = code.index().is_none();
-        let takes_p = is_additional || (code == CoordinateSystem::First && self.dialect == Dialect::Fanuc);
+        let takes_p = match code {
+            CoordinateSystem::First => self.dialect == Dialect::Fanuc,
+            CoordinateSystem::Sixth => self.dialect == Dialect::Mach3,
+            _ => is_additional,
+        };
         let number = match of_code {
             Some(number) => Some(u32::from(number)),
             None if takes_p && codes.g.action.is_none() => block.take_integer('P')?,
@@ -36,6 +40,11 @@ impl State {
         };
         self.offsets.active = match (code.index(), number) {
             (Some(index), None) => index,
+            // G59 P of Mach3 has G54 to G59 at 1 to 6.
+            (Some(_), Some(number @ 1..=6)) if code == CoordinateSystem::Sixth => number as usize - 1,
+            (Some(_), Some(number @ 7..=254)) if code == CoordinateSystem::Sixth => {
+                WORK_OFFSET_COUNT - 7 + number as usize
+            }
             (_, Some(number)) if (1..=ADDITIONAL_OFFSET_COUNT as u32).contains(&number) => {
                 WORK_OFFSET_COUNT - 1 + number as usize
             }
@@ -137,6 +146,7 @@ impl State {
             Some(2 | 20) => {}
             Some(level) if is_macro_b && (50..=52).contains(&level) => {
                 self.note_without_effect(format!("G10 L{level}"));
+                self.enters_parameters = true;
                 block.skip("ABCDEHIJKPQRUVWXYZ");
                 return Ok(());
             }

@@ -63,6 +63,8 @@ pub(super) struct State {
     pub steps: VecDeque<ProgramStep>,
     /// True if the motions of the line are in machine coordinates.
     pub moves_in_machine_coordinates: bool,
+    /// True between G10 L50 and G11: the lines have parameters of the control.
+    pub enters_parameters: bool,
     /// True after the program end.
     pub has_ended: bool,
 }
@@ -236,6 +238,7 @@ impl State {
             jump: None,
             steps: VecDeque::new(),
             moves_in_machine_coordinates: false,
+            enters_parameters: false,
             has_ended: false,
             options,
         }

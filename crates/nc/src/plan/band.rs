@@ -3,27 +3,18 @@
 /// Symmetric band matrix with its right-hand side.
 #[derive(Debug, Clone, Default)]
 pub(super) struct BandSystem {
-    /// Row i: entries (i, i), (i, i + 1), (i, i + 2).
-    rows: Vec<[f64; 3]>,
-    right: Vec<f64>,
+    /// Entries (i, i), (i, i + 1) and (i, i + 2).
+    pub bands: [Vec<f64>; 3],
+    pub right: Vec<f64>,
 }
 
 impl BandSystem {
     /// Sets all entries of a system of `size` unknowns to 0.
     pub fn clear(&mut self, size: usize) {
-        self.rows.clear();
-        self.rows.resize(size, [0.0; 3]);
-        self.right.clear();
-        self.right.resize(size, 0.0);
-    }
-
-    /// Adds a symmetric block of three unknowns from `first` on, by its entries (0, 0), (0, 1), (0, 2), (1, 1), (1, 2) and
-    /// (2, 2), and their right-hand side.
-    pub fn add(&mut self, first: usize, [a, b, c, d, e, f]: &[f64; 6], right: &[f64; 3]) {
-        for (row, block) in self.rows[first..].iter_mut().zip([[*a, *b, *c], [*d, *e, 0.0], [*f, 0.0, 0.0]]) {
-            add(row, &block);
+        for vector in self.bands.iter_mut().chain([&mut self.right]) {
+            vector.clear();
+            vector.resize(size, 0.0);
         }
-        add(&mut self.right[first..], right);
     }
 
     /// Adds `factor · right` to the right-hand side.
@@ -33,52 +24,58 @@ impl BandSystem {
 
     /// Fixes unknown `index` at 0.
     pub fn fix(&mut self, index: usize) {
-        self.rows[index] = [1.0, 0.0, 0.0];
-        self.right[index] = 0.0;
-        for back in 1..=2 {
-            if let Some(before) = index.checked_sub(back) {
-                self.rows[before][back] = 0.0;
+        for (k, band) in self.bands.iter_mut().enumerate() {
+            band[index] = if k == 0 { 1.0 } else { 0.0 };
+            if let Some(before) = index.checked_sub(k).filter(|_| k > 0) {
+                band[before] = 0.0;
             }
         }
+        self.right[index] = 0.0;
     }
 
-    /// Solves the system in place and returns the unknowns, or `None` if the matrix is not positive definite.
-    pub fn solve(&mut self) -> Option<&[f64]> {
-        let n = self.rows.len();
+    /// Makes the first unknown the second one times `tie`.
+    pub fn tie_first(&mut self, tie: f64) {
+        let [diagonal, first, second] = &mut self.bands;
+        diagonal[1] += tie * (2.0 * first[0] + tie * diagonal[0]);
+        first[1] += tie * second[0];
+    }
+
+    /// Makes the last of `n` unknowns the one before it times `tie`.
+    pub fn tie_last(&mut self, n: usize, tie: f64) {
+        let [diagonal, first, second] = &mut self.bands;
+        diagonal[n - 2] += tie * (2.0 * first[n - 2] + tie * diagonal[n - 1]);
+        first[n - 3] += tie * second[n - 3];
+    }
+
+    /// Solves the system of the first `n` unknowns in place and returns them, or `None` if the matrix is not positive
+    /// definite.
+    pub fn solve(&mut self, n: usize) -> Option<&[f64]> {
+        let [diagonal, first, second] = self.bands.each_mut().map(|band| &mut band[..n]);
+        let right = &mut self.right[..n];
         for i in 0..n {
-            let [d, e, f] = self.rows[i];
+            let d = diagonal[i];
             if !(d > 0.0 && d.is_finite()) {
                 return None;
             }
-            let right = self.right[i];
+            let (e, f, inverse) = (first[i], second[i], 1.0 / d);
+            let (l, m) = (e * inverse, f * inverse);
             if i + 1 < n {
-                let l = e / d;
-                self.rows[i + 1][0] -= l * e;
-                self.rows[i + 1][1] -= l * f;
-                self.right[i + 1] -= l * right;
+                diagonal[i + 1] -= l * e;
+                first[i + 1] -= l * f;
+                right[i + 1] -= l * right[i];
             }
             if i + 2 < n {
-                let l = f / d;
-                self.rows[i + 2][0] -= l * f;
-                self.right[i + 2] -= l * right;
+                diagonal[i + 2] -= m * f;
+                right[i + 2] -= m * right[i];
             }
+            (first[i], second[i]) = (l, m);
+            right[i] *= inverse;
         }
+        let (mut after, mut beyond) = (0.0, 0.0);
         for i in (0..n).rev() {
-            let [d, e, f] = self.rows[i];
-            let mut value = self.right[i];
-            if i + 1 < n {
-                value -= e * self.right[i + 1];
-            }
-            if i + 2 < n {
-                value -= f * self.right[i + 2];
-            }
-            self.right[i] = value / d;
+            let value = right[i] - first[i] * after - second[i] * beyond;
+            (right[i], after, beyond) = (value, value, after);
         }
-        Some(&self.right)
+        Some(right)
     }
-}
-
-/// Adds `terms` to the first of `sums`.
-pub(super) fn add(sums: &mut [f64], terms: &[f64]) {
-    sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
 }

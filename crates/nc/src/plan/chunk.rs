@@ -135,7 +135,7 @@ impl PartProgramPlanner<'_> {
                 break;
             }
         }
-        self.ahead.renew(self.local + self.reserve)?;
+        self.ahead.renew(self.passed, self.local + self.reserve)?;
         self.is_finished = self.ahead.entries.is_empty();
         if parts.is_empty() {
             return Ok(None);

@@ -34,23 +34,29 @@ pub(super) struct IntervalMotion {
 
 /// Argument below which hyperbolic functions are computed by their series.
 const SERIES: f64 = 0.5;
+/// 1 / ((2n + k − 1) (2n + k)) for n = 1, 2, … and k = 0, 1, 2: ratios of the terms x^n / (2n + k)!.
+const INVERSES: [[f64; 9]; 3] = {
+    let mut inverses = [[0.0; 9]; 3];
+    let mut k = 0;
+    while k < 3 {
+        let mut n = 1;
+        while n < 10 {
+            inverses[k][n - 1] = 1.0 / ((2 * n + k - 1) * (2 * n + k)) as f64;
+            n += 1;
+        }
+        k += 1;
+    }
+    inverses
+};
 /// Newton steps for the duration of an interval.
 const NEWTON_STEPS: usize = 8;
 
 /// Returns C = cosh √x, S₁ = sinh √x / √x and S₂ = (cosh √x − 1) / x, for negative x with circular functions.
 fn functions(x: f64) -> [f64; 3] {
     if x.abs() < SERIES {
-        // Terms x^n / (2n + k)!
-        let series = |k: f64| {
-            let (mut term, mut sum, mut n) = (1.0, 1.0, 0.0);
-            while n < 9.0 {
-                n += 1.0;
-                term *= x / ((2.0 * n + k - 1.0) * (2.0 * n + k));
-                sum += term;
-            }
-            sum
-        };
-        return [series(0.0), series(1.0), 0.5 * series(2.0)];
+        let series =
+            |inverse: &[f64; 9]| inverse.iter().rev().fold(1.0, |sum, inverse| 1.0 + x * inverse * sum);
+        return [series(&INVERSES[0]), series(&INVERSES[1]), 0.5 * series(&INVERSES[2])];
     }
     let root = x.abs().sqrt();
     if x > 0.0 {

@@ -20,7 +20,7 @@ use super::window::{Interval, Stations, Window, WindowStart};
 const MAX_INTERVALS: usize = 6000;
 /// Time ahead at which the window is planned again, and time up to which the path is read, in stopping times.
 const RENEWAL: f64 = 2.0;
-const HORIZON: f64 = 10.0;
+const HORIZON: f64 = 5.0;
 /// Smallest number of intervals between two stops.
 const MIN_INTERVALS: usize = 6;
 /// Plans of one window with reduced limits before it is rejected.
@@ -58,6 +58,8 @@ pub(super) struct LookAhead<'a> {
     steady: (Option<f64>, f64),
     /// Time of a stop from the highest rate in the window, s.
     stopping_time: f64,
+    /// Time along the path up to which the plan reaches far enough, s.
+    sufficient: f64,
     /// Planned time above which the window is not planned again, since that failed or the window is full, s.
     retry_time: f64,
     /// Factor on the programmed feeds of pieces not yet read.
@@ -80,6 +82,7 @@ impl<'a> LookAhead<'a> {
             next: VecDeque::new(),
             steady: (None, 0.0),
             stopping_time: 0.0,
+            sufficient: 0.0,
             retry_time: f64::INFINITY,
             feed_factor: 1.0,
             planned_intervals: 0,
@@ -101,8 +104,11 @@ impl<'a> LookAhead<'a> {
     }
 
     /// Plans ahead if less than the renewal time is planned. The motion up to `reserve` seconds after the start of the
-    /// first interval remains as it is.
-    pub fn renew(&mut self, reserve: f64) -> Result<(), FeedPlanError> {
+    /// first interval, which is at `passed` along the path, remains as it is.
+    pub fn renew(&mut self, passed: f64, reserve: f64) -> Result<(), FeedPlanError> {
+        if passed + reserve < self.sufficient {
+            return Ok(());
+        }
         if self.trapezoid.is_some() {
             let planned = |entry: &PlannedInterval| entry.motion.map_or(0.0, |motion| motion.duration);
             while self.entries.iter().map(planned).sum::<f64>() <= reserve && self.extend_trapezoid()? {}
@@ -123,6 +129,7 @@ impl<'a> LookAhead<'a> {
                 ends_at_stop = entry.is_stop;
                 beyond += usize::from(planned > enough);
                 if beyond > margin || (beyond > 0 && entry.is_stop) {
+                    self.set_sufficient(passed);
                     return Ok(());
                 }
             }
@@ -148,6 +155,22 @@ impl<'a> LookAhead<'a> {
                 self.set_retry_time(reserve);
             }
         }
+    }
+
+    /// Sets the time up to which the plan reaches far enough.
+    fn set_sufficient(&mut self, passed: f64) {
+        self.sufficient = 0.0;
+        if self.retry_time.is_finite() {
+            return;
+        }
+        // Ends of the last intervals: those before the last ones may be short of the renewal time.
+        let (mut end, mut ends) = (passed, [f64::NEG_INFINITY; MIN_INTERVALS + 1]);
+        for motion in self.entries.iter().map_while(|entry| entry.motion) {
+            end += motion.duration;
+            ends.rotate_left(1);
+            ends[MIN_INTERVALS] = end;
+        }
+        self.sufficient = ends[0] - RENEWAL * self.stopping_time;
     }
 
     /// Appends the next motion of a control with trapezoidal speed; returns false at the end of the program.
@@ -357,16 +380,17 @@ impl<'a> LookAhead<'a> {
                 interval.guess = b + 0.5 * slope * interval.length;
             }
         }
-        let mut last = None;
+        let (mut last, mut is_again) = (None, false);
+
         for _ in 0..MAX_ROUNDS {
-            let Some((stations, is_optimal)) = self.solve(&intervals, start) else { break };
+            let Some((stations, is_optimal)) = self.solve(&intervals, start, is_again) else { break };
             let motions = motions(&intervals, start, &stations);
             let is_within = self.reduce(first, &mut intervals, &motions);
             if is_within && is_optimal {
                 self.accept(first, motions);
                 return Ok(true);
             }
-            last = Some((stations, motions));
+            (last, is_again) = (Some((stations, motions)), true);
             if !is_optimal {
                 break;
             }
@@ -392,11 +416,17 @@ impl<'a> LookAhead<'a> {
     }
 
     /// Returns the stations of the fastest motion, and true if it is optimal.
-    fn solve(&mut self, intervals: &[Interval], start: WindowStart) -> Option<(Stations, bool)> {
+    fn solve(
+        &mut self,
+        intervals: &[Interval],
+        start: WindowStart,
+        is_again: bool,
+    ) -> Option<(Stations, bool)> {
         let rest = [intervals[0].length, intervals[intervals.len() - 1].length];
         let window = Window { intervals, start, rest, joints: &self.model.joints };
         self.planned_intervals += intervals.len() as u64;
-        let (stations, is_optimal) = self.solver.solve(&window)?;
+        let (stations, is_optimal) =
+            if is_again { self.solver.solve_again(&window) } else { self.solver.solve(&window) }?;
         stations
             .iter()
             .all(|(b, slope)| *b > 0.0 && b.is_finite() && slope.is_finite())

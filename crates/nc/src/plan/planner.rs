@@ -249,7 +249,7 @@ impl<'a> PartProgramPlanner<'a> {
             self.check_travel_limits()?;
             return Ok(Some(self.last));
         }
-        self.ahead.renew(self.local + self.reserve)?;
+        self.ahead.renew(self.passed, self.local + self.reserve)?;
         let factor = self
             .ahead
             .entries
@@ -288,7 +288,7 @@ impl<'a> PartProgramPlanner<'a> {
         // Real time left in the cycle: a standstill takes its time at any rate.
         let (mut left, mut passed) = (self.period, None);
         loop {
-            self.ahead.renew(self.local + self.reserve)?;
+            self.ahead.renew(self.passed, self.local + self.reserve)?;
             let Some(entry) = self.ahead.entries.front() else {
                 self.is_finished = true;
                 return Ok(passed);

@@ -13,7 +13,7 @@
 
 use virtual_axes_core::simd::{LANES, SliceOperation, vectorize};
 
-use super::band::{BandSystem, add};
+use super::band::BandSystem;
 use super::window::{Form, Stations, Window, WindowStart, dot};
 
 /// Largest number of iterations.
@@ -33,24 +33,33 @@ const MIN_GUESS: f64 = 0.02;
 /// that the guess violates would take many iterations to become feasible.
 const GAP_GUESS: f64 = 0.5;
 const SLACK_GUESS: f64 = 0.3;
+/// Duality gap relative to the time at which the state is kept for the next solution of the same window.
+const GAP_MIDDLE: f64 = 0.02;
 /// Fraction of the way to the boundary per iteration: of slacks and multipliers, and of coefficients.
 const TO_BOUNDARY: f64 = 0.99;
 const COEFFICIENT_TO_ZERO: f64 = 0.7;
 
-/// Values of as many constraints as fill the largest vector.
+/// Values of as many intervals as fill the largest vector.
 type Lanes = [f64; LANES];
 
-/// Constraints |g| ≤ 1 on three consecutive coefficients, one in each lane.
+/// Forms in three consecutive coefficients, of one interval in each lane.
+type FormLanes = [Lanes; 3];
+
+/// Places in an interval with constraints on the jerk: start, end and middle.
+const PLACES: usize = 3;
+
+/// Constraint |g| ≤ 1 on three consecutive coefficients of each of several intervals in a row.
 #[derive(Debug, Clone)]
-struct Block {
-    /// Linear forms: g, or g/√b for a jerk.
-    form: [Lanes; 3],
-    /// Linear form of the b of a jerk, and 1 for other constraints.
-    speed: [Lanes; 3],
-    constant: Lanes,
-    gradient: [Lanes; 3],
+struct Constraint {
+    /// Linear form: g, or g/√b for a jerk; 0 where the interval does not have the constraint.
+    form: FormLanes,
     value: Lanes,
-    /// Slacks and multipliers of both sides; multipliers of lanes that are not used are 0.
+    sides: Sides,
+}
+
+/// Slacks and multipliers of both sides; multipliers of lanes that are not used are 0.
+#[derive(Debug, Clone, Copy)]
+struct Sides {
     slacks: [Lanes; 2],
     multipliers: [Lanes; 2],
 }
@@ -58,112 +67,109 @@ struct Block {
 /// Number of sums over the constraints of an interval.
 const SUMS: usize = 16;
 
-impl Block {
-    /// Constraints that always hold.
+/// Square root of b at a place of each interval, and ½ of its relative change in a step; 1 and 0 for constraints without √b.
+#[derive(Debug, Clone, Copy)]
+struct Root {
+    root: Lanes,
+    change: Lanes,
+}
+
+impl Root {
+    const NONE: Self = Self { root: [1.0; LANES], change: [0.0; LANES] };
+}
+
+/// Gradient of the constraints at a place.
+#[derive(Clone, Copy)]
+struct Slope<'a> {
+    root: &'a Lanes,
+    /// ½ of the derivatives of b by the coefficients, divided by b.
+    speed: &'a FormLanes,
+}
+
+impl Constraint {
+    /// Constraint that always holds.
     const EMPTY: Self = Self {
         form: [[0.0; LANES]; 3],
-        speed: [[0.0; LANES]; 3],
-        constant: [1.0; LANES],
-        gradient: [[0.0; LANES]; 3],
         value: [0.0; LANES],
-        slacks: [[1.0; LANES]; 2],
-        multipliers: [[0.0; LANES]; 2],
+        sides: Sides { slacks: [[1.0; LANES]; 2], multipliers: [[0.0; LANES]; 2] },
     };
-
-    /// Returns the steps of slack and multiplier of one side in a lane, by the step of the constraint toward it.
-    #[inline(always)]
-    fn side(&self, i: usize, side: usize, along: f64, barrier: f64) -> [f64; 2] {
-        let (slack, multiplier) = (self.slacks[side][i], self.multipliers[side][i]);
-        let value = if side == 0 { self.value[i] } else { -self.value[i] };
-        let step = -(value - 1.0 + slack) - along;
-        let barrier = if multiplier > 0.0 { barrier } else { 0.0 };
-        [step, (barrier - multiplier * step) / slack - multiplier]
-    }
-
-    /// Returns the step of the constraint in a lane, by the steps of the coefficients.
-    #[inline(always)]
-    fn along(&self, i: usize, steps: &Form) -> f64 {
-        self.gradient[0][i] * steps[0] + self.gradient[1][i] * steps[1] + self.gradient[2][i] * steps[2]
-    }
 
     /// Sets `most` to the largest parts of the slacks and of the multipliers that a whole step takes away.
     #[inline(always)]
-    fn bound(&self, steps: &Form, barrier: f64, most: &mut [Lanes; 2]) {
-        let [slacks, multipliers] = most;
-        for (i, (most_of_slack, most_of_multiplier)) in slacks.iter_mut().zip(multipliers).enumerate() {
-            let along = self.along(i, steps);
-            let (upper, lower) = (self.side(i, 0, along, barrier), self.side(i, 1, -along, barrier));
-            let slack = larger(-upper[0] / self.slacks[0][i], -lower[0] / self.slacks[1][i]);
-            *most_of_slack = larger(slack, *most_of_slack);
-            let multiplier = larger(-upper[1] / self.multipliers[0][i], *most_of_multiplier);
-            *most_of_multiplier = larger(-lower[1] / self.multipliers[1][i], multiplier);
+    fn bound(&self, steps: &FormLanes, root: &Root, barrier: f64, most: &mut [Lanes; 2]) {
+        let Self { form: [f0, f1, f2], value, sides } = self;
+        let Sides { slacks: [s0, s1], multipliers: [m0, m1] } = sides;
+        let [t0, t1, t2] = steps;
+        let [slack, multiplier] = most;
+        for i in 0..LANES {
+            let along =
+                root.root[i] * (f0[i] * t0[i] + f1[i] * t1[i] + f2[i] * t2[i]) + value[i] * root.change[i];
+            let inverse = 1.0 / (s0[i] * s1[i]);
+            let (i0, i1) = (s1[i] * inverse, s0[i] * inverse);
+            let (r0, r1) = ((1.0 - value[i] - along) * i0 - 1.0, (1.0 + value[i] + along) * i1 - 1.0);
+            slack[i] = larger(larger(-r0, -r1), slack[i]);
+            // Not a number where the multipliers are 0.
+            let inverse = barrier / (m0[i] * m1[i]);
+            let (w0, w1) = (1.0 + r0 - m1[i] * inverse * i0, 1.0 + r1 - m0[i] * inverse * i1);
+            multiplier[i] = larger(w1, larger(w0, multiplier[i]));
         }
     }
 
     /// Makes a step.
     #[inline(always)]
-    fn pass(&mut self, steps: &Form, step: &Step) {
+    fn pass(&mut self, steps: &FormLanes, root: &Root, step: &Step) {
+        let Self { form: [f0, f1, f2], value, sides } = self;
+        let Sides { slacks: [s0, s1], multipliers: [m0, m1] } = sides;
+        let [t0, t1, t2] = steps;
         for i in 0..LANES {
-            let along = self.along(i, steps);
-            let upper = self.side(i, 0, along, step.barrier);
-            let lower = self.side(i, 1, -along, step.barrier);
-            self.slacks[0][i] += step.primal * upper[0];
-            self.slacks[1][i] += step.primal * lower[0];
-            self.multipliers[0][i] += step.dual * upper[1];
-            self.multipliers[1][i] += step.dual * lower[1];
+            let along =
+                root.root[i] * (f0[i] * t0[i] + f1[i] * t1[i] + f2[i] * t2[i]) + value[i] * root.change[i];
+            let (d0, d1) = (1.0 - value[i] - s0[i] - along, 1.0 + value[i] - s1[i] + along);
+            let inverse = 1.0 / (s0[i] * s1[i]);
+            let barrier = if m0[i] > 0.0 { step.barrier } else { 0.0 };
+            m0[i] += step.dual * ((barrier - m0[i] * d0) * (s1[i] * inverse) - m0[i]);
+            m1[i] += step.dual * ((barrier - m1[i] * d1) * (s0[i] * inverse) - m1[i]);
+            s0[i] += step.primal * d0;
+            s1[i] += step.primal * d1;
         }
     }
 
-    /// Computes values and gradients at the coefficients `c`.
+    /// Computes the value at the coefficients `c`, and adds to `sums`: the matrix, its right-hand side without and with the
+    /// factor of the barrier, the gradient of the Lagrangian, and the gap. Sets `residual` to the largest violation.
     #[inline(always)]
-    fn linearize(&mut self, c: &Form, tie: &Tie) {
-        let (form, speed) = (&self.form, &self.speed);
+    fn add_to(&mut self, c: &FormLanes, slope: &Slope<'_>, sums: &mut [Lanes; SUMS], residual: &mut Lanes) {
+        let Self { form: [f0, f1, f2], value: values, sides } = self;
+        let Sides { slacks: [s0, s1], multipliers: [m0, m1] } = sides;
+        let ([c0, c1, c2], [b0, b1, b2], root) = (c, slope.speed, slope.root);
         for i in 0..LANES {
-            let b = speed[0][i] * c[0] + speed[1][i] * c[1] + speed[2][i] * c[2] + self.constant[i];
-            let root = larger(b, f64::MIN_POSITIVE).sqrt();
-            let value = form[0][i] * c[0] + form[1][i] * c[1] + form[2][i] * c[2];
-            let half = 0.5 * value / root;
-            let first = root * form[0][i] + half * speed[0][i];
-            let middle = root * form[1][i] + half * speed[1][i];
-            let last = root * form[2][i] + half * speed[2][i];
-            self.value[i] = root * value;
-            self.gradient[0][i] = tie.keep[0] * first;
-            self.gradient[1][i] = tie.keep[1] * (middle + tie.share[0] * first + tie.share[1] * last);
-            self.gradient[2][i] = tie.keep[2] * last;
-        }
-    }
-
-    /// Adds to `sums`: the matrix, its right-hand side without and with the factor of the barrier, the gradient of the
-    /// Lagrangian, and the gap. Sets `residuals` to the largest violations of all constraints and of those without √b.
-    #[inline(always)]
-    fn add_to(&self, sums: &mut [Lanes; SUMS], residuals: &mut [Lanes; 2]) {
-        for i in 0..LANES {
-            let [s0, s1] = [self.slacks[0][i], self.slacks[1][i]];
-            let [m0, m1] = [self.multipliers[0][i], self.multipliers[1][i]];
-            let [r0, r1] = [self.value[i] - 1.0 + s0, -self.value[i] - 1.0 + s1];
-            let [i0, i1] = [1.0 / s0, 1.0 / s1];
-            let [w0, w1] = [m0 * i0, m1 * i1];
-            let (weight, right, pull, slope) = (w0 + w1, w1 * r1 - w0 * r0, i1 - i0, m0 - m1);
-            let [g0, g1, g2] = [self.gradient[0][i], self.gradient[1][i], self.gradient[2][i]];
-            sums[0][i] += weight * g0 * g0;
-            sums[1][i] += weight * g0 * g1;
-            sums[2][i] += weight * g0 * g2;
-            sums[3][i] += weight * g1 * g1;
-            sums[4][i] += weight * g1 * g2;
-            sums[5][i] += weight * g2 * g2;
+            let value = root[i] * (f0[i] * c0[i] + f1[i] * c1[i] + f2[i] * c2[i]);
+            values[i] = value;
+            let g0 = root[i] * f0[i] + value * b0[i];
+            let g1 = root[i] * f1[i] + value * b1[i];
+            let g2 = root[i] * f2[i] + value * b2[i];
+            let (r0, r1) = (value - 1.0 + s0[i], s1[i] - 1.0 - value);
+            let inverse = 1.0 / (s0[i] * s1[i]);
+            let (i0, i1) = (s1[i] * inverse, s0[i] * inverse);
+            let (w0, w1) = (m0[i] * i0, m1[i] * i1);
+            let (weight, right, pull, lagrangian) = (w0 + w1, w1 * r1 - w0 * r0, i1 - i0, m0[i] - m1[i]);
+            let (h0, h1, h2) = (weight * g0, weight * g1, weight * g2);
+            sums[0][i] += h0 * g0;
+            sums[1][i] += h0 * g1;
+            sums[2][i] += h0 * g2;
+            sums[3][i] += h1 * g1;
+            sums[4][i] += h1 * g2;
+            sums[5][i] += h2 * g2;
             sums[6][i] += right * g0;
             sums[7][i] += right * g1;
             sums[8][i] += right * g2;
             sums[9][i] += pull * g0;
             sums[10][i] += pull * g1;
             sums[11][i] += pull * g2;
-            sums[12][i] += slope * g0;
-            sums[13][i] += slope * g1;
-            sums[14][i] += slope * g2;
-            sums[15][i] += s0 * m0 + s1 * m1;
-            let residual = larger(r0, r1);
-            residuals[0][i] = larger(residual, residuals[0][i]);
-            residuals[1][i] = larger(residual * self.constant[i], residuals[1][i]);
+            sums[12][i] += lagrangian * g0;
+            sums[13][i] += lagrangian * g1;
+            sums[14][i] += lagrangian * g2;
+            sums[15][i] += s0[i] * m0[i] + s1[i] * m1[i];
+            residual[i] = larger(larger(r0, r1), residual[i]);
         }
     }
 }
@@ -174,30 +180,32 @@ fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// Returns the sum of the lanes.
+/// Returns the lanes of three consecutive coefficients of each interval of a group.
 #[inline(always)]
-fn total(lanes: &Lanes) -> f64 {
-    let [a, b, c, d, e, f, g, h] = lanes;
-    ((a + e) + (c + g)) + ((b + f) + (d + h))
+fn consecutive(values: &[f64], from: usize) -> FormLanes {
+    let mut lanes = [[0.0; LANES]; 3];
+    for (k, lanes) in lanes.iter_mut().enumerate() {
+        lanes.copy_from_slice(&values[from + k..from + k + LANES]);
+    }
+    lanes
 }
 
-/// Coefficients of an interval that depend on others or are fixed.
-#[derive(Debug, Clone, Copy)]
-struct Tie {
-    /// 0 for a coefficient that is not free.
-    keep: Form,
-    /// Shares of the first and of the last coefficient that follow the middle one.
-    share: [f64; 2],
+/// Adds lanes to consecutive values.
+#[inline(always)]
+fn add(values: &mut [f64], from: usize, lanes: &Lanes) {
+    values[from..from + LANES].iter_mut().zip(lanes).for_each(|(value, lane)| *value += lane);
 }
 
-/// Interval with its constraints.
-#[derive(Debug, Clone, Copy)]
-struct Section {
-    /// End of the blocks of its constraints.
-    end: usize,
-    tie: Tie,
-    /// Weight of 1/√c in the time.
-    weight: f64,
+/// Intervals in a row, one in each lane.
+#[derive(Debug, Clone)]
+struct Group {
+    /// Weight of 1/√c in the time; 0 beyond the last interval.
+    weight: Lanes,
+    /// Linear forms of b at each place.
+    speed: [FormLanes; PLACES],
+    /// Roots of b at the present coefficients, and inverse of 2b.
+    roots: [Lanes; PLACES],
+    inverses: [Lanes; PLACES],
 }
 
 /// Progress of the iteration.
@@ -229,54 +237,110 @@ pub(super) struct SpeedSolver {
     coefficients: Vec<f64>,
     /// Steps of the coefficients.
     steps: Vec<f64>,
-    sections: Vec<Section>,
-    blocks: Vec<Block>,
-    /// Number of constraints.
+    groups: Vec<Group>,
+    /// Constraints of the groups, of each at first those without √b, then those on the jerk by place.
+    constraints: Vec<Constraint>,
+    /// Number of constraints without √b and of those on the jerk at a place, of each group.
+    counts: [usize; 2],
+    /// Number of constraints of all intervals.
     count: usize,
+    /// Number of coefficients.
+    size: usize,
     /// Derivatives of the Lagrangian, and part of the right-hand side that is proportional to the barrier.
     gradient: Vec<f64>,
     pulls: Vec<f64>,
     system: BandSystem,
+    /// State in the middle of the last iteration.
+    middle: Middle,
+}
+
+/// Coefficients, slacks and multipliers in the middle of an iteration, from which it continues with slightly reduced limits.
+#[derive(Debug, Default)]
+struct Middle {
+    coefficients: Vec<f64>,
+    sides: Vec<Sides>,
+    barrier: f64,
 }
 
 impl SpeedSolver {
     /// Returns b and b′ at the stations between the first and the last interval, and true if the iteration converged, or
     /// `None` if it failed.
     pub fn solve(&mut self, window: &Window<'_>) -> Option<(Stations, bool)> {
-        self.initialize(window);
         let ties = window.ties();
-        self.set_constraints(window, &ties);
-        self.assemble(None);
+        let barrier = self.begin(window, &ties);
+        self.iterate(window, &ties, barrier)
+    }
+
+    /// Returns the solution of the window of the last call of [`solve`](Self::solve), whose limits were slightly reduced.
+    pub fn solve_again(&mut self, window: &Window<'_>) -> Option<(Stations, bool)> {
+        let ties = &window.ties();
+        self.set_constraints(window);
+        let Middle { coefficients, sides, barrier } = &self.middle;
+        if coefficients.len() != self.coefficients.len() || sides.len() != self.constraints.len() {
+            return self.solve(window);
+        }
+        self.coefficients.clone_from(coefficients);
+        self.constraints.iter_mut().zip(sides).for_each(|(constraint, sides)| constraint.sides = *sides);
+        let barrier = *barrier;
+        self.assemble(window, ties, None);
+        match self.iterate(window, ties, barrier) {
+            Some((stations, true)) => Some((stations, true)),
+            _ => self.solve(window),
+        }
+    }
+
+    /// Sets the first guess, and returns its barrier.
+    fn begin(&mut self, window: &Window<'_>, ties: &[f64; 2]) -> f64 {
+        self.initialize(window);
+        self.set_constraints(window);
+        self.assemble(window, ties, None);
         if window.start == WindowStart::Rest {
             // Strictly within all bounds: jerk is proportional to b^(3/2).
-            let values = self.blocks.iter().flat_map(|block| block.value);
+            let values = self.constraints.iter().flat_map(|constraint| constraint.value);
             let worst = values.map(f64::abs).fold(0.0, f64::max);
             let factor = (0.9 / worst).clamp(MIN_GUESS, 1.0);
             self.coefficients.iter_mut().for_each(|c| *c *= factor);
-            self.assemble(None);
+            self.assemble(window, ties, None);
         }
-        let weighted = self.sections.iter().zip(&self.coefficients[1..]);
-        let time: f64 = weighted.map(|(section, c)| section.weight / c.sqrt()).sum();
-        let sides = 2.0 * self.count as f64;
-        let mut barrier = GAP_GUESS * time / sides;
-        for block in &mut self.blocks {
+        let weights = self.groups.iter().flat_map(|group| group.weight);
+        let time: f64 = weights.zip(&self.coefficients[1..]).map(|(weight, c)| weight / c.sqrt()).sum();
+        let barrier = GAP_GUESS * time / (2.0 * self.count as f64);
+        for Constraint { form, value, sides } in &mut self.constraints {
             for i in 0..LANES {
-                let is_used = (0..3).any(|k| block.form[k][i] != 0.0);
-                for (side, excess) in [block.value[i] - 1.0, -block.value[i] - 1.0].into_iter().enumerate() {
-                    block.slacks[side][i] = (-excess).max(SLACK_GUESS);
-                    block.multipliers[side][i] = if is_used { barrier / block.slacks[side][i] } else { 0.0 };
+                let is_used = form.iter().any(|lanes| lanes[i] != 0.0);
+                for (side, excess) in [value[i] - 1.0, -value[i] - 1.0].into_iter().enumerate() {
+                    sides.slacks[side][i] = (-excess).max(SLACK_GUESS);
+                    sides.multipliers[side][i] = if is_used { barrier / sides.slacks[side][i] } else { 0.0 };
                 }
             }
         }
-        self.assemble(None);
+        self.assemble(window, ties, None);
+        barrier
+    }
+
+    /// Returns the solution after iterations from the present coefficients, slacks and multipliers.
+    fn iterate(
+        &mut self,
+        window: &Window<'_>,
+        ties: &[f64; 2],
+        mut barrier: f64,
+    ) -> Option<(Stations, bool)> {
+        let sides = 2.0 * self.count as f64;
+        let mut is_middle = false;
+
         for _ in 0..MAX_ITERATIONS {
-            let step = self.step(window, &ties, barrier)?;
-            let Progress { gap, residual, linear_residual, dual, time } = self.assemble(Some(step));
+            let step = self.step(ties, barrier)?;
+            let Progress { gap, residual, linear_residual, dual, time } =
+                self.assemble(window, ties, Some(step));
             let is_feasible = residual <= RESIDUAL && linear_residual <= LINEAR_RESIDUAL;
             if gap <= GAP * time && is_feasible && dual <= DUAL * time {
                 return Some((self.stations(window), true));
             }
             let average = gap / sides;
+            if !is_middle && gap <= GAP_MIDDLE * time {
+                is_middle = true;
+                self.keep_middle(barrier);
+            }
             if dual <= 0.5 * gap && residual <= 0.1 {
                 barrier = barrier.min(0.15 * average);
             } else if dual <= 2.0 * gap {
@@ -284,6 +348,14 @@ impl SpeedSolver {
             }
         }
         Some((self.stations(window), false))
+    }
+
+    /// Keeps the present state for [`solve_again`](Self::solve_again).
+    fn keep_middle(&mut self, barrier: f64) {
+        self.middle.coefficients.clone_from(&self.coefficients);
+        self.middle.sides.clear();
+        self.middle.sides.extend(self.constraints.iter().map(|constraint| constraint.sides));
+        self.middle.barrier = barrier;
     }
 
     /// Sets the coefficients to a slow profile.
@@ -296,19 +368,24 @@ impl SpeedSolver {
         let mut gains = Vec::with_capacity(inner.len());
         for (k, interval) in inner.iter().enumerate() {
             let mut bound = interval.cap * interval.cap;
-            let (mut acceleration, mut jerk) = (f64::INFINITY, f64::INFINITY);
+            let (mut acceleration, mut jerk, mut bend) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
             for (j, bounds) in window.joints.iter().enumerate() {
                 for [first, second, third] in &interval.ends {
                     bound = bound.min(0.5 * bounds.acceleration / second[j].abs());
-                    bound = bound.min((0.5 * bounds.jerk / third[j].abs()).powf(2.0 / 3.0));
+                    bend = bend.min(0.5 * bounds.jerk / third[j].abs());
                     acceleration = acceleration.min(0.3 * bounds.acceleration / first[j].abs());
                     jerk = jerk.min(GUESS_JERK * bounds.jerk / first[j].abs());
                 }
             }
+            let bound = bound.min(bend.powf(2.0 / 3.0));
             c[k + 1] = GUESS * bound;
             gains.push((2.0 * acceleration * interval.length, (4.5 * jerk).sqrt() * interval.length));
         }
-        let grown = |c: f64, gain: (f64, f64)| (c + gain.0).min((c.powf(0.75) + gain.1).powf(4.0 / 3.0));
+        let grown = |c: f64, gain: (f64, f64)| {
+            let root = c.sqrt();
+            let power = root * root.sqrt() + gain.1;
+            (c + gain.0).min(power * power.cbrt())
+        };
         let fixed = match window.start {
             WindowStart::Rest => {
                 c[1] = c[1].min(0.5 * window.rest_bound(0));
@@ -340,77 +417,94 @@ impl SpeedSolver {
     }
 
     /// Sets the constraints of all intervals.
-    fn set_constraints(&mut self, window: &Window<'_>, ties: &[f64; 2]) {
-        let (is_rest, last) = (window.start == WindowStart::Rest, window.inner().len() - 1);
-        self.sections.clear();
-        self.blocks.clear();
+    fn set_constraints(&mut self, window: &Window<'_>) {
+        let (is_rest, length) = (window.start == WindowStart::Rest, window.inner().len());
+        let joints = window.moving_joints();
+        self.counts = [PLACES + joints.len(), joints.len()];
+        let per_group = self.counts[0] + PLACES * self.counts[1];
+        let groups = length.div_ceil(LANES);
+        let empty = Group {
+            weight: [0.0; LANES],
+            speed: [[[0.0; LANES], [1.0; LANES], [0.0; LANES]]; PLACES],
+            roots: [[1.0; LANES]; PLACES],
+            inverses: [[0.0; LANES]; PLACES],
+        };
+        self.groups.clear();
+        self.groups.resize(groups, empty);
+        self.constraints.clear();
+        self.constraints.resize(groups * per_group, Constraint::EMPTY);
+        self.size = length + 2;
+        // Lanes beyond the last interval have no constraints.
+        self.coefficients.resize(LANES * groups + 2, 1.0);
         self.count = 0;
-        for k in 0..=last {
-            let shape = window.shape(k);
-            let (blocks, mut used) = (&mut self.blocks, LANES);
-            let mut push = |form: Form, speed: Option<&Form>| {
+        for k in 0..length {
+            let (shape, i) = (window.shape(k), k % LANES);
+            let group = &mut self.groups[k / LANES];
+            group.weight[i] = window.weight(k);
+            for (speed, form) in group.speed.iter_mut().zip(&shape.b) {
+                speed.iter_mut().zip(form).for_each(|(lanes, value)| lanes[i] = *value);
+            }
+            let mut constraints = self.constraints[k / LANES * per_group..].iter_mut();
+            let mut push = |form: Form| {
+                let Some(constraint) = constraints.next() else { return };
                 // Of the coefficients that a moving start fixes alone: nothing can be done about these.
-                if form[2] == 0.0 && k == 0 && !is_rest {
+                if form == [0.0; 3] || form[2] == 0.0 && k == 0 && !is_rest {
                     return;
                 }
-                if used == LANES {
-                    blocks.push(Block::EMPTY);
-                    used = 0;
-                }
-                if let Some(block) = blocks.last_mut() {
-                    for (lanes, value) in block.form.iter_mut().zip(form) {
-                        lanes[used] = value;
-                    }
-                    for (lanes, value) in block.speed.iter_mut().zip(speed.into_iter().flatten()) {
-                        lanes[used] = *value;
-                    }
-                    block.constant[used] = if speed.is_some() { 0.0 } else { 1.0 };
-                }
-                used += 1;
+                constraint.form.iter_mut().zip(form).for_each(|(lanes, value)| lanes[i] = value);
                 self.count += 1;
             };
-            window.linear_forms(k, &shape, |form| push(form, None));
-            for end in 0..3 {
-                window.jerk_forms(k, &shape, end, |form| push(form, Some(&shape.b[end])));
+            for (form, bound) in shape.b.iter().zip(window.feed_bounds(k)) {
+                push(form.map(|value| value / bound));
             }
-            let mut tie = Tie { keep: [1.0; 3], share: [0.0; 2] };
-            if k == 0 {
-                (tie.keep[0], tie.share[0]) = (0.0, ties[0]);
+            for joint in &joints {
+                push(window.acceleration_form(k, &shape, *joint));
             }
-            if k == last {
-                (tie.keep[2], tie.share[1]) = (0.0, ties[1]);
+            for place in 0..PLACES {
+                for joint in &joints {
+                    push(window.jerk_form(k, &shape, *joint, place));
+                }
             }
-            if !is_rest {
-                // The first two coefficients are fixed.
-                tie.keep[..2_usize.saturating_sub(k)].fill(0.0);
-            }
-            self.sections.push(Section { end: self.blocks.len(), tie, weight: window.weight(k) });
         }
     }
 
     /// Makes a step, and computes the constraints and the linear system of the next one at the new coefficients.
-    fn assemble(&mut self, step: Option<Step>) -> Progress {
-        let size = self.coefficients.len();
-        self.system.clear(size);
+    fn assemble(&mut self, window: &Window<'_>, ties: &[f64; 2], step: Option<Step>) -> Progress {
+        let padded = self.coefficients.len();
+        self.system.clear(padded);
         for vector in [&mut self.gradient, &mut self.pulls] {
             vector.clear();
-            vector.resize(size, 0.0);
+            vector.resize(padded, 0.0);
         }
-        self.steps.resize(size, 0.0);
-        vectorize(Assembly { solver: self, step })
+        self.steps.resize(padded, 0.0);
+        let mut progress = vectorize(Assembly { solver: self, step });
+        // Coefficients that depend on others or are fixed.
+        let n = self.size;
+        self.system.tie_first(ties[0]);
+        self.system.tie_last(n, ties[1]);
+        for vector in [&mut self.system.right, &mut self.gradient, &mut self.pulls] {
+            vector[1] += ties[0] * vector[0];
+            vector[n - 2] += ties[1] * vector[n - 1];
+            (vector[0], vector[n - 1]) = (0.0, 0.0);
+        }
+        self.system.fix(0);
+        self.system.fix(n - 1);
+        if window.start != WindowStart::Rest {
+            self.system.fix(1);
+            (self.gradient[1], self.pulls[1]) = (0.0, 0.0);
+        }
+        let derivatives = self.gradient.iter().zip(&self.coefficients);
+        progress.dual = derivatives.take(n).map(|(g, c)| (g * c).abs()).sum();
+        progress
     }
 
     /// Returns the next step and passes it to the coefficients, or `None` if the linear system is singular.
-    fn step(&mut self, window: &Window<'_>, ties: &[f64; 2], barrier: f64) -> Option<Step> {
-        let (is_rest, n) = (window.start == WindowStart::Rest, self.coefficients.len());
+    fn step(&mut self, ties: &[f64; 2], barrier: f64) -> Option<Step> {
+        let n = self.size;
         self.system.add_right(barrier, &self.pulls);
-        self.system.fix(0);
-        self.system.fix(n - 1);
-        if !is_rest {
-            self.system.fix(1);
-        }
-        self.steps.clear();
-        self.steps.extend_from_slice(self.system.solve()?);
+        self.steps[..n].copy_from_slice(self.system.solve(n)?);
+        self.steps[0] += ties[0] * self.steps[1];
+        self.steps[n - 1] = ties[1] * self.steps[n - 2];
         // Parts of coefficients, slacks and multipliers that a whole step takes away.
         let coefficients = self.coefficients.iter().zip(&self.steps).map(|(c, step)| -step / c);
         let coefficients = coefficients.fold(0.0, f64::max) / COEFFICIENT_TO_ZERO;
@@ -420,10 +514,6 @@ impl SpeedSolver {
         for (c, step) in self.coefficients.iter_mut().zip(&self.steps) {
             *c += primal * step;
         }
-        if is_rest {
-            self.coefficients[0] = ties[0] * self.coefficients[1];
-        }
-        self.coefficients[n - 1] = ties[1] * self.coefficients[n - 2];
         Some(Step { barrier, primal, dual: multipliers.max(1.0).recip() })
     }
 
@@ -446,44 +536,108 @@ struct Assembly<'a> {
     step: Option<Step>,
 }
 
+impl Group {
+    /// Returns the root of b at a place before a step, with its relative change.
+    #[inline(always)]
+    fn change(&self, place: usize, steps: &FormLanes) -> Root {
+        let mut root = Root { root: self.roots[place], change: [0.0; LANES] };
+        let ([b0, b1, b2], [t0, t1, t2], inverse) = (&self.speed[place], steps, &self.inverses[place]);
+        for i in 0..LANES {
+            root.change[i] = (b0[i] * t0[i] + b1[i] * t1[i] + b2[i] * t2[i]) * inverse[i];
+        }
+        root
+    }
+
+    /// Computes the root of b at a place; returns ½ of the derivatives of b by the coefficients, divided by b.
+    #[inline(always)]
+    fn set_root(&mut self, place: usize, c: &FormLanes) -> FormLanes {
+        let mut slopes = [[0.0; LANES]; 3];
+        let ([b0, b1, b2], [c0, c1, c2]) = (&self.speed[place], c);
+        let ([v0, v1, v2], root, inverse) = (&mut slopes, &mut self.roots[place], &mut self.inverses[place]);
+        for i in 0..LANES {
+            let b = larger(b0[i] * c0[i] + b1[i] * c1[i] + b2[i] * c2[i], f64::MIN_POSITIVE);
+            root[i] = b.sqrt();
+            inverse[i] = 0.5 / b;
+            v0[i] = inverse[i] * b0[i];
+            v1[i] = inverse[i] * b1[i];
+            v2[i] = inverse[i] * b2[i];
+        }
+        slopes
+    }
+}
+
 impl SliceOperation for Assembly<'_> {
     type Output = Progress;
 
     #[inline(always)]
     fn run(self) -> Progress {
-        let SpeedSolver { coefficients, steps, sections, blocks, gradient, pulls, system, .. } = self.solver;
-        let (mut progress, mut residuals, mut from) = (Progress::default(), [[0.0; LANES]; 2], 0);
-        for (k, section) in sections.iter().enumerate() {
-            let (c, steps) = (three(coefficients, k), three(steps, k));
-            let mut sums = [[0.0; LANES]; SUMS];
-            for block in &mut blocks[from..section.end] {
-                if let Some(step) = &self.step {
-                    block.pass(&steps, step);
+        let SpeedSolver { coefficients, steps, groups, constraints, counts, gradient, pulls, system, .. } =
+            self.solver;
+        let [linear, jerks] = *counts;
+        let (mut times, mut gaps, mut residuals) = ([0.0; LANES], [0.0; LANES], [[0.0; LANES]; 2]);
+        let per_group = constraints.chunks_exact_mut(linear + PLACES * jerks);
+        for (g, (group, constraints)) in groups.iter_mut().zip(per_group).enumerate() {
+            let from = LANES * g;
+            let (c, steps) = (consecutive(coefficients, from), consecutive(steps, from));
+            if let Some(step) = &self.step {
+                let (linear, jerk) = constraints.split_at_mut(linear);
+                linear.iter_mut().for_each(|constraint| constraint.pass(&steps, &Root::NONE, step));
+                for place in 0..PLACES {
+                    let root = group.change(place, &steps);
+                    let at = &mut jerk[place * jerks..(place + 1) * jerks];
+                    at.iter_mut().for_each(|constraint| constraint.pass(&steps, &root, step));
                 }
-                block.linearize(&c, &section.tie);
-                block.add_to(&mut sums, &mut residuals);
             }
-            from = section.end;
-            let time = section.weight / c[1].sqrt();
-            let slope = -0.5 * time / c[1] * section.tie.keep[1];
-            let mut totals = [0.0; SUMS];
-            for (total_of, lanes) in totals.iter_mut().zip(&sums) {
-                *total_of = total(lanes);
+            let mut sums = [[0.0; LANES]; SUMS];
+            let none = [[0.0; LANES]; 3];
+            let slope = Slope { root: &[1.0; LANES], speed: &none };
+            for constraint in &mut constraints[..linear] {
+                constraint.add_to(&c, &slope, &mut sums, &mut residuals[1]);
             }
-            let [m0, m1, m2, m3, m4, m5, r0, r1, r2, p0, p1, p2, g0, g1, g2, gap] = totals;
-            progress.time += time;
-            progress.gap += gap;
-            system.add(k, &[m0, m1, m2, m3 - 1.5 * slope / c[1], m4, m5], &[r0, r1 - slope, r2]);
-            add(&mut pulls[k..], &[p0, p1, p2]);
-            add(&mut gradient[k..], &[g0, g1 + slope, g2]);
+            for place in 0..PLACES {
+                let speed = group.set_root(place, &c);
+                let slope = Slope { root: &group.roots[place], speed: &speed };
+                for constraint in &mut constraints[linear + place * jerks..linear + (place + 1) * jerks] {
+                    constraint.add_to(&c, &slope, &mut sums, &mut residuals[0]);
+                }
+            }
+            let mut bends = [0.0; LANES];
+            let mut slopes = [0.0; LANES];
+            for i in 0..LANES {
+                let time = group.weight[i] / c[1][i].sqrt();
+                times[i] += time;
+                gaps[i] += sums[15][i];
+                slopes[i] = -0.5 * time / c[1][i];
+                bends[i] = -1.5 * slopes[i] / c[1][i];
+            }
+            let [m0, m1, m2, m3, m4, m5, r0, r1, r2, p0, p1, p2, g0, g1, g2, _] = &sums;
+            let [diagonal, first, second] = &mut system.bands;
+            add(diagonal, from, m0);
+            add(diagonal, from + 1, m3);
+            add(diagonal, from + 1, &bends);
+            add(diagonal, from + 2, m5);
+            add(first, from, m1);
+            add(first, from + 1, m4);
+            add(second, from, m2);
+            add(&mut system.right, from + 1, &slopes.map(|slope| -slope));
+            add(gradient, from + 1, &slopes);
+            for (k, ([right, pull], slope)) in
+                [[r0, p0], [r1, p1], [r2, p2]].into_iter().zip([g0, g1, g2]).enumerate()
+            {
+                add(&mut system.right, from + k, right);
+                add(pulls, from + k, pull);
+                add(gradient, from + k, slope);
+            }
         }
-        let [residual, linear_residual] = residuals.map(|lanes| lanes.into_iter().fold(0.0, larger));
-        (progress.residual, progress.linear_residual) = (residual, linear_residual);
-        // Derivatives by coefficients that are not free are 0.
-        for (g, c) in gradient.iter().zip(coefficients.iter()) {
-            progress.dual += (g * c).abs();
+        let largest = |lanes: &Lanes| lanes.iter().copied().fold(0.0, larger);
+        let linear_residual = largest(&residuals[1]);
+        Progress {
+            gap: gaps.iter().sum(),
+            residual: larger(largest(&residuals[0]), linear_residual),
+            linear_residual,
+            dual: 0.0,
+            time: times.iter().sum(),
         }
-        progress
     }
 }
 
@@ -499,28 +653,25 @@ impl SliceOperation for StepBounds<'_> {
 
     #[inline(always)]
     fn run(self) -> [f64; 2] {
-        let (mut most, mut from) = ([[0.0; LANES]; 2], 0);
-        for (k, section) in self.solver.sections.iter().enumerate() {
-            let steps = three(&self.solver.steps, k);
-            for block in &self.solver.blocks[from..section.end] {
-                block.bound(&steps, self.barrier, &mut most);
+        let SpeedSolver { steps, groups, constraints, counts: [linear, jerks], .. } = self.solver;
+        let mut most = [[0.0; LANES]; 2];
+        for (g, (group, constraints)) in
+            groups.iter().zip(constraints.chunks_exact(linear + PLACES * jerks)).enumerate()
+        {
+            let steps = consecutive(steps, LANES * g);
+            let (linear, jerk) = constraints.split_at(*linear);
+            for constraint in linear {
+                constraint.bound(&steps, &Root::NONE, self.barrier, &mut most);
             }
-            from = section.end;
-        }
-        let mut largest = [0.0; 2];
-        for (largest, lanes) in largest.iter_mut().zip(&most) {
-            for value in lanes {
-                *largest = larger(*value, *largest);
+            for place in 0..PLACES {
+                let root = group.change(place, &steps);
+                for constraint in &jerk[place * jerks..(place + 1) * jerks] {
+                    constraint.bound(&steps, &root, self.barrier, &mut most);
+                }
             }
         }
-        largest
+        most.map(|lanes| lanes.into_iter().fold(0.0, larger))
     }
-}
-
-/// Returns three consecutive values from index `k` on.
-#[inline(always)]
-fn three(values: &[f64], k: usize) -> Form {
-    [values[k], values[k + 1], values[k + 2]]
 }
 
 #[cfg(test)]

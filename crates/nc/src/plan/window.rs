@@ -2,7 +2,7 @@
 
 use virtual_axes_core::config::LimitsConfig;
 
-use super::vector::{JointVector, MAX_JOINTS};
+use super::vector::JointVector;
 
 /// First three derivatives of the joints at one end of an interval.
 pub(super) type Node = [JointVector; 3];
@@ -129,49 +129,48 @@ impl Window<'_> {
         (1.5 * acceleration * h).min((4.5 * jerk).powf(2.0 / 3.0) * h.powf(4.0 / 3.0))
     }
 
-    /// Calls `push` with each form g of the linear constraints |g| ≤ 1 of inner interval `k`: speed, and acceleration of
-    /// the joints.
-    pub fn linear_forms(&self, k: usize, shape: &IntervalForms, mut push: impl FnMut(Form)) {
-        let (inner, interval) = (self.inner(), &self.inner()[k]);
-        let mut upper = |form: &Form, bound: f64| {
-            if bound.is_finite() {
-                push(scaled(form, 1.0 / bound));
-            }
-        };
-        let bound = interval.cap * interval.cap;
-        for at in [0, 2, 1] {
-            upper(&shape.b[at], bound);
-        }
+    /// Returns the largest b by the feed at the start, at the end and in the middle of inner interval `k`.
+    pub fn feed_bounds(&self, k: usize) -> [f64; 3] {
+        let inner = self.inner();
+        let mut bounds = [inner[k].cap * inner[k].cap; 3];
         if k == 0 && self.start == WindowStart::Rest {
-            upper(&shape.b[0], self.rest_bound(0));
+            bounds[0] = bounds[0].min(self.rest_bound(0));
         }
         if k + 1 == inner.len() {
-            upper(&shape.b[1], self.rest_bound(1));
+            bounds[1] = bounds[1].min(self.rest_bound(1));
         }
-        for (bounds, [q1, q2, q3]) in self.joints.iter().zip(derivatives(interval, 0)) {
-            if q1 != 0.0 || q2 != 0.0 || q3 != 0.0 {
-                let scale = 1.0 / (interval.share * bounds.acceleration);
-                push(sum(&scaled(&shape.slope[0], 0.5 * q1 * scale), &scaled(&shape.b[0], q2 * scale)));
-            }
-        }
+        bounds
     }
 
-    /// Calls `push` with each form g of the constraints |√b g| ≤ 1 on the jerk of the joints at the start (0), the end (1) or
-    /// in the middle (2) of inner interval `k`.
-    pub fn jerk_forms(&self, k: usize, shape: &IntervalForms, end: usize, mut push: impl FnMut(Form)) {
+    /// Returns the form g of the constraint |g| ≤ 1 on the acceleration of a joint at the start of inner interval `k`.
+    pub fn acceleration_form(&self, k: usize, shape: &IntervalForms, joint: usize) -> Form {
         let interval = &self.inner()[k];
-        for (bounds, [q1, q2, q3]) in self.joints.iter().zip(derivatives(interval, end)) {
-            if q1 != 0.0 || q2 != 0.0 || q3 != 0.0 {
-                let curved = sum(&scaled(&shape.slope[end], 1.5 * q2), &scaled(&shape.curvature, 0.5 * q1));
-                let form = sum(&scaled(&shape.b[end], q3), &curved);
-                push(scaled(&form, 1.0 / (interval.share * bounds.jerk)));
-            }
-        }
+        let [q1, q2, _] = derivatives(interval, joint, 0);
+        let scale = 1.0 / (interval.share * self.joints[joint].acceleration);
+        sum(&scaled(&shape.slope[0], 0.5 * q1 * scale), &scaled(&shape.b[0], q2 * scale))
+    }
+
+    /// Returns the form g of the constraint |√b g| ≤ 1 on the jerk of a joint at the start (0), the end (1) or in the middle
+    /// (2) of inner interval `k`.
+    pub fn jerk_form(&self, k: usize, shape: &IntervalForms, joint: usize, end: usize) -> Form {
+        let interval = &self.inner()[k];
+        let [q1, q2, q3] = derivatives(interval, joint, end);
+        let curved = sum(&scaled(&shape.slope[end], 1.5 * q2), &scaled(&shape.curvature, 0.5 * q1));
+        let form = sum(&scaled(&shape.b[end], q3), &curved);
+        scaled(&form, 1.0 / (interval.share * self.joints[joint].jerk))
+    }
+
+    /// Returns the indices of the joints that move.
+    pub fn moving_joints(&self) -> Vec<usize> {
+        let moves = |node: &Node, j: usize| node.iter().any(|derivative| derivative[j] != 0.0);
+        let any =
+            |j: &usize| self.inner().iter().any(|interval| interval.ends.iter().any(|node| moves(node, *j)));
+        (0..self.joints.len()).filter(any).collect()
     }
 }
 
-/// Returns the first three derivatives of each joint at the start (0), the end (1) or in the middle (2) of an interval.
-fn derivatives(interval: &Interval, end: usize) -> impl Iterator<Item = [f64; 3]> {
+/// Returns the first three derivatives of a joint at the start (0), the end (1) or in the middle (2) of an interval.
+fn derivatives(interval: &Interval, joint: usize, end: usize) -> [f64; 3] {
     let [from, to] = if end == 2 { [0, 1] } else { [end; 2] }.map(|end| &interval.ends[end]);
-    (0..MAX_JOINTS).map(move |j| [0, 1, 2].map(|order| 0.5 * (from[order][j] + to[order][j])))
+    [0, 1, 2].map(|order| 0.5 * (from[order][joint] + to[order][joint]))
 }

@@ -593,3 +593,40 @@ fn codes_that_end_what_is_not_active_have_no_effect() {
         assert!(found.as_ref().is_err_and(|error| error.to_string().contains(remedy)), "{line}: {found:?}");
     }
 }
+
+#[test]
+fn rigid_tapping_and_parameters_of_the_control_are_accepted() {
+    let header = "O1\nG21 G90 G0 X0 Y0 Z20.\nM3 S500\n";
+    let tapped = [[0.0, 0.0, 20.0], [0.0, 0.0, 5.0], [0.0, 0.0, -10.0], [0.0, 0.0, 5.0], [0.0, 0.0, 20.0]];
+    for code in ["G84", "G84.2", "G84.3"] {
+        let text = format!("{header}{code} Z-10. R5. F500.\nG80\nM30\n");
+        assert_ends(Dialect::Fanuc, &text, &tapped);
+    }
+    // Parameter 1815 of axis 2: no motion, and modes stay as they are.
+    let text = format!("{header}G1 X1. F500.\nG10 L50\nN1815 P2 R00100000\nN1420 R5000\nG11\nX3. Y4.\nM30\n");
+    assert_ends(Dialect::Fanuc, &text, &[[0.0, 0.0, 20.0], [1.0, 0.0, 20.0], [3.0, 4.0, 20.0]]);
+}
+
+/// Chamfer of a bore of 14 mm by 45° with a tool of 1 mm radius: full circles whose radius grows with the height.
+#[test]
+fn a_chamfer_by_macro_b_has_circles_of_growing_radius() {
+    let text = "%\nO60 (CHAMFER)\nG21 G17 G90\nG52 X [ 0. ] Y [ 0. ] Z [ 0. ]\nG0 X0 Y0 Z10.\n#10= 14.\n#1= 0.\n#2= -2.\n\
+                #3= 0.75\n#4= 2. / 2\n#5= 45.\nWHILE [ #1 GT #2 ] DO1\n#1= #1 - #3\nIF [ #1 LT #2 ] THEN #1= #2\n\
+                #20= #10 / 2 + [ [ #1 - #2 ] * TAN[ #5 ] ] - #4\nG1 X [ 0. ] Y [ 0. ] F500.\nG1 Z#1\n\
+                G1 X [ 0. ] Y [ #20 ]\nG3 I [ 0. ] J [ - #20 ]\nG1 X [ 0. ] Y [ 0. ]\nEND1\nM30\n%\n";
+    let mut expected = vec![[0.0, 0.0, 10.0]];
+    for z in [-0.75, -1.5, -2.0] {
+        let radius = 7.0 - 1.0 + (z + 2.0);
+        expected.extend([[0.0, 0.0, z], [0.0, radius, z], [0.0, radius, z], [0.0, 0.0, z]]);
+    }
+    assert_ends(Dialect::Fanuc, text, &expected);
+    let circles: Vec<f64> = motions(text, options(Dialect::Fanuc))
+        .iter()
+        .filter_map(|motion| match &motion.kind {
+            MotionKind::Arc(arc) => Some(arc.sweep),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(circles.len(), 3);
+    assert!(circles.iter().all(|sweep| (sweep - 2.0 * std::f64::consts::PI).abs() < 1e-9), "{circles:?}");
+}

@@ -194,3 +194,11 @@ fn g0_of_marlin_moves_at_the_feed() {
     assert!(matches!(last, Feed::Linear(feed) if (feed - 0.01).abs() < 1e-12), "{last:?}");
     assert!(matches!(feeds(Dialect::Grbl)[3], Feed::Rapid));
 }
+
+#[test]
+fn work_offsets_of_mach3_have_numbers() {
+    let text = "G21 G90\nG10 L2 P2 X10 Y20\nG59 P2\nG0 X1 Y1\nG59 P1\nG0 X1 Y2\nG59 P7\nG0 X3 Y4\nM30\n";
+    let options = InterpreterOptions { dialect: Some(Dialect::Mach3), ..InterpreterOptions::default() };
+    let ends: Vec<_> = motions(text, options).iter().map(|motion| millimeters(&motion.end)).collect();
+    assert_eq!(ends, [[11.0, 21.0, 0.0], [1.0, 2.0, 0.0], [3.0, 4.0, 0.0]]);
+}
