@@ -111,6 +111,14 @@ struct Candidate {
     cost: f64,
 }
 
+impl LoopFit {
+    /// Returns true if the lag is no whole number of position cycles.
+    pub fn is_between_cycles(&self) -> bool {
+        let lag = self.values.iter().find(|value| value.parameter == LoopParameter::Lag);
+        lag.is_some_and(|lag| !divides(self.periods.position, lag.value))
+    }
+}
+
 impl LoopProblem<'_> {
     fn experiments(&self, periods: &Periods, shift: f64) -> Vec<Experiment> {
         let all = self.recordings.iter().enumerate();
@@ -480,8 +488,10 @@ impl LoopProblem<'_> {
         Some(fit)
     }
 
-    /// Returns the position cycle with the least residual, its minimum, and the cycles with about the same residual. Differences below the
-    /// resolution of the encoder and the error of interpolated setpoints do not count. Among cycles with about the same residual, the renewal of the signals is preferred, then that of the machine file if it divides the lag, then the first one.
+    /// Returns the position cycle with the least residual, its minimum, and the cycles with about the same residual.
+    /// Residuals below the resolution of the encoder or the error of interpolated setpoints count alike. Among cycles with
+    /// about the same residual, the renewal of the signals is preferred, then that of the machine file if it divides the
+    /// lag, then the first one.
     ///
     /// A motion shows β + Tsp, so the others start with β changed by the difference of the cycles.
     fn best_cycle(

@@ -79,6 +79,8 @@ pub(super) struct LoggedInstant {
     pub cycle: usize,
     /// Probability before the comparison.
     pub prior: f64,
+    /// True if β of the simulation is that of the axis: others widen the standard errors only.
+    pub is_identified: bool,
     /// Simulated current of the instant minus the mean over a position cycle.
     pub ripple: CurrentRipple,
     /// Inertia of the simulation, kg·m².
@@ -92,6 +94,8 @@ pub(super) struct CurrentLoggings {
     pub instants: Vec<LoggedInstant>,
     /// Relative standard error of the simulated ripple.
     pub error: f64,
+    /// True if the phase of the samples in the position cycles is known. Otherwise all ways remain as probable as before.
+    pub is_phase_known: bool,
 }
 
 /// Result of the regression.
@@ -621,7 +625,8 @@ impl MovingData {
         let of_instants: f64 = loggings.instants.iter().map(|instant| instant.prior).sum();
         let weight = |(way, _, cost): &(Option<usize>, DVector<f64>, f64)| {
             let prior = way.map_or(1.0 - of_instants, |k| loggings.instants[k].prior);
-            prior * (-0.5 * (cost - least) / (noise * noise)).exp()
+            let excess = if loggings.is_phase_known { cost - least } else { 0.0 };
+            prior * (-0.5 * excess / (noise * noise)).exp()
         };
         let sum: f64 = compared.iter().map(weight).sum();
         let cycle_of = |way: &Option<usize>| way.map(|k| loggings.instants[k].cycle);
@@ -634,7 +639,9 @@ impl MovingData {
         let cycle = (1..=cycles).find(|cycle| share(*cycle) > CERTAIN).unwrap_or(0);
         let best = compared
             .iter()
-            .filter(|(way, _, _)| cycle_of(way).is_none_or(|of_it| of_it == cycle))
+            .filter(|(way, _, _)| {
+                way.is_none_or(|k| loggings.instants[k].cycle == cycle && loggings.instants[k].is_identified)
+            })
             .max_by(|a, b| weight(a).total_cmp(&weight(b)));
         let mut spread = DMatrix::zeros(x.len(), x.len());
         if let Some((_, center, _)) = best.filter(|_| sum > 0.0) {
@@ -642,31 +649,6 @@ impl MovingData {
                 let mut change = DVector::zeros(x.len());
                 change.rows_mut(0, RIPPLE).copy_from(&(&way.1 - center).rows(0, RIPPLE));
                 spread += &change * change.transpose() * (weight(way) / sum);
-            }
-        }
-        if std::env::var("DIAG").is_ok() {
-            let mut all: Vec<_> = compared
-                .iter()
-                .map(|c| {
-                    (
-                        weight(c) / sum,
-                        c.0.map(|k| {
-                            (loggings.instants[k].cycle, (loggings.instants[k].offset * 1e6).round())
-                        }),
-                        c.1[0] / x[0],
-                        c.1[size] / c.1[0],
-                        1e3 * c.1[size - 1],
-                        (c.2 - least) / (noise * noise),
-                    )
-                })
-                .collect();
-            all.sort_by(|a, b| b.0.total_cmp(&a.0));
-            eprintln!("noise {:.5} of largest; best {:?}", noise / largest, best.map(|b| b.0));
-            for a in all.iter().take(9) {
-                eprintln!(
-                    "  w {:.4} {:?} J/Jmean {:.4} share {:.3} lag {:.3} ms cost {:.2}",
-                    a.0, a.1, a.2, a.3, a.4, a.5
-                );
             }
         }
         ComparedLoggings { best: best.and_then(|(way, _, _)| *way), spread }

@@ -225,14 +225,16 @@ fn possible_loggings(recordings: &[(&Signals, FeedforwardMode)], fit: &LoopFit) 
             for (offset, ripple) in ripples {
                 let share = if offset == 0.0 { AT_SAMPLE } else { AT_OTHERS / later };
                 let prior = share * probability(*shift) / (all * cycles.len() as f64);
-                let inertia = axis.motor.inertia;
-                instants.push(LoggedInstant { offset, cycle, prior, ripple, inertia });
+                let (inertia, is_identified) = (axis.motor.inertia, *shift == 0);
+                instants.push(LoggedInstant { offset, cycle, prior, is_identified, ripple, inertia });
             }
         }
     }
     let error = of(LoopParameter::Bandwidth)
         .map_or(LARGEST_RIPPLE_ERROR, |bandwidth| bandwidth.error / bandwidth.value);
-    CurrentLoggings { instants, error: error.clamp(LEAST_RIPPLE_ERROR, LARGEST_RIPPLE_ERROR) }
+    // A logger that delays the actual values by a part of a cycle leaves their phase unknown.
+    let is_phase_known = !fit.is_between_cycles();
+    CurrentLoggings { instants, error: error.clamp(LEAST_RIPPLE_ERROR, LARGEST_RIPPLE_ERROR), is_phase_known }
 }
 
 /// Returns the ripple of the current at the samples for each instant at which it can be logged, with its time behind the
