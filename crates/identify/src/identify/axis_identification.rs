@@ -8,6 +8,7 @@ use virtual_axes_core::config::{AxisConfig, ConfigError, ParameterKind, Paramete
 use virtual_axes_core::machine::MachineError;
 use virtual_axes_core::units::MILLISECOND_NS;
 
+use super::experiment::CurrentLogging;
 use super::recorded_feedforward::recorded_feedforward;
 use super::summary::IdentificationSummary;
 use super::validate::validate_with;
@@ -106,12 +107,12 @@ pub struct AxisValidation {
 
 impl AxisValidation {
     /// Compares the identified axis with the recording. An unknown feedforward is the one with the
-    /// smaller residual; `joint` is the share of the ripple of the position cycle in the current after a joint fit.
+    /// smaller residual; `joint` is the logging of the current after a joint fit.
     fn new(
         mut recorded: ConditionedRecording,
         axis: &AxisConfig,
         periods: &Periods,
-        joint: Option<f64>,
+        joint: Option<CurrentLogging>,
     ) -> Result<Self, AxisIdentificationError> {
         let has_setpoints = recorded.signals.spans.iter().any(|span| span.psec.is_some());
         if recorded.feedforward.is_none() && has_setpoints {
@@ -215,7 +216,7 @@ impl AxisIdentification {
         let updated = identified.machine_config()?;
 
         start(&format!("validating {}", axis.name()))?;
-        let joint = identification.periods.map(|_| identification.ripple());
+        let joint = identification.periods.map(|_| identification.current_logging());
         let validations = others.into_iter().map(|mut recorded| {
             // Recordings of one machine usually have the same feedforward.
             let known = identification.active_feedforward.first().copied();

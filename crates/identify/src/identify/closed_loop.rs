@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::experiment::{Experiment, SimulatedExperiment};
+use super::experiment::{CurrentLogging, Experiment, SimulatedExperiment};
 use super::feedforward_mode::FeedforwardMode;
 use super::low_pass::LowPassFilter;
 use super::setpoints::{SetpointGrid, stride};
@@ -38,8 +38,8 @@ pub fn find_experiments(
     let tsp = seconds(periods.position);
     if stride(signals.period, tsp).is_none() {
         // A current recorded more coarsely than the position cycle counts as its mean.
-        let ripple = if signals.period > tsp { 0.0 } else { 1.0 };
-        return trace_experiments(signals, recording, periods, (mode, 0.0, ripple));
+        let logging = if signals.period > tsp { CurrentLogging::MEAN } else { CurrentLogging::INSTANT };
+        return trace_experiments(signals, recording, periods, (mode, 0.0, logging));
     }
     let mut found = Vec::new();
     let (resting, still) = match axis.kind() {
@@ -75,7 +75,7 @@ pub fn find_experiments(
                 first: sample as f64 * signals.period - time,
                 period: signals.period,
                 trace_filter: signals.trace_filter,
-                ripple: 1.0,
+                logging: CurrentLogging::INSTANT,
                 start: span.start + sample as f64 * signals.period,
                 position: of(&span.position),
                 velocity: of(span.recorded_velocity.as_ref().unwrap_or(&span.velocity)),
@@ -172,25 +172,82 @@ pub fn simulate(
     periods: &Periods,
     experiment: &Experiment,
 ) -> Result<SimulatedExperiment, MachineError> {
+    let is_instant = experiment.logging == CurrentLogging::INSTANT;
+    let (mut simulated, history) = simulate_ticks(axis, periods, experiment, !is_instant)?;
+    if !is_instant {
+        simulated.current = history.logged(experiment, experiment.logging);
+    }
+    Ok(simulated)
+}
+
+/// Simulated currents of an experiment at the current cycles.
+pub(super) struct CurrentHistory {
+    /// Sums of the currents before each cycle, A.
+    sums: Vec<f64>,
+    /// Current cycle, s.
+    tick: f64,
+    /// Position cycle, s.
+    tsp: f64,
+}
+
+impl CurrentHistory {
+    /// Simulates an axis on an experiment.
+    ///
+    /// # Errors
+    /// [`MachineError`] if the axis parameters are invalid.
+    pub fn new(axis: &AxisConfig, periods: &Periods, experiment: &Experiment) -> Result<Self, MachineError> {
+        Ok(simulate_ticks(axis, periods, experiment, true)?.1)
+    }
+
+    /// Returns the current logged at each sample, A.
+    pub fn logged(&self, experiment: &Experiment, logging: CurrentLogging) -> Vec<f64> {
+        let count = self.sums.len() - 1;
+        if count == 0 {
+            return Vec::new();
+        }
+        let value = |k: usize| self.sums[k.min(count - 1) + 1] - self.sums[k.min(count - 1)];
+        let half = 0.5 * self.tsp / self.tick;
+        let of = |i: usize| {
+            let time = (experiment.first + i as f64 * experiment.period) / self.tick;
+            let at = (time + logging.offset / self.tick + 1e-6).max(0.0);
+            let (k, part) = (at as usize, (at.fract() - 1e-6).max(0.0));
+            let instant = value(k) + (value(k + 1) - value(k)) * part;
+            let (from, to) = ((time - half).max(0.0) as usize, ((time + half) as usize).min(count));
+            if to <= from {
+                return instant;
+            }
+            let mean = (self.sums[to] - self.sums[from]) / (to - from) as f64;
+            mean + logging.ripple * (instant - mean)
+        };
+        (0..experiment.position.len()).map(of).collect()
+    }
+}
+
+/// Simulates an axis on an experiment, with the current of all cycles if `has_history`.
+fn simulate_ticks(
+    axis: &AxisConfig,
+    periods: &Periods,
+    experiment: &Experiment,
+    has_history: bool,
+) -> Result<(SimulatedExperiment, CurrentHistory), MachineError> {
     let config = MachineConfig::from_axis(experiment.mode.of(axis), *periods);
     let mut machine = Machine::new(Arc::new(MachineParameters::new(&config)?));
-    let Some(first) = experiment.psec.first() else { return Ok(SimulatedExperiment::default()) };
-    machine.reset(&[*first]);
     let tick = seconds(periods.current);
-    let (count, mut next) = (experiment.position.len(), 0);
+    let mut history = CurrentHistory { sums: vec![0.0], tick, tsp: seconds(periods.position) };
     let mut simulated = SimulatedExperiment::default();
+    let Some(first) = experiment.psec.first() else { return Ok((simulated, history)) };
+    machine.reset(&[*first]);
+    let (count, mut next) = (experiment.position.len(), 0);
     let mut before = [0.0; 3];
     // Time in ticks; samples between two ticks are interpolated.
     let time_of = |i: usize| (experiment.first + i as f64 * experiment.period) / tick;
     let mut due = time_of(0);
     let mut now = 0_u64;
-    let has_mean = experiment.ripple != 1.0;
-    let mut sums = vec![0.0];
     let mut filters = experiment
         .trace_filter
         .map(|cutoff| [*first, 0.0, 0.0].map(|start| LowPassFilter::new(cutoff, tick, start)));
-    // Without a filter or a mean, only the ticks on either side of a sample are read.
-    let needs_all = has_mean || filters.is_some();
+    // Without a filter or a history, only the ticks on either side of a sample are read.
+    let needs_all = has_history || filters.is_some();
     let ticks = machine.ticks_per_period();
     for psec in &experiment.psec {
         machine.advance(&[*psec], &[]);
@@ -218,8 +275,8 @@ pub fn simulate(
                 next += 1;
                 due = time_of(next);
             }
-            if has_mean {
-                sums.push(sums.last().copied().unwrap_or(0.0) + here[2]);
+            if has_history {
+                history.sums.push(history.sums.last().copied().unwrap_or(0.0) + here[2]);
             }
             before = here;
             now += 1;
@@ -228,18 +285,7 @@ pub fn simulate(
             before = machine.motion_at(0, ticks - 1);
         }
     }
-    if has_mean {
-        let half = 0.5 * seconds(periods.position) / tick;
-        for (i, current) in simulated.current.iter_mut().enumerate() {
-            let (from, to) = ((time_of(i) - half).max(0.0) as usize, (time_of(i) + half) as usize);
-            let to = to.min(sums.len() - 1);
-            if to > from {
-                let mean = (sums[to] - sums[from]) / (to - from) as f64;
-                *current = mean + experiment.ripple * (*current - mean);
-            }
-        }
-    }
-    Ok(simulated)
+    Ok((simulated, history))
 }
 
 /// Simulates an axis on several experiments in parallel.

@@ -234,6 +234,7 @@ pub(super) fn correlation_inflation(residuals: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::identify::closed_loop::simulate;
+    use crate::identify::experiment::CurrentLogging;
     use virtual_axes_core::config::Parameters;
     use virtual_axes_core::units::seconds;
 
@@ -252,7 +253,7 @@ mod tests {
             first: 0.0,
             period: tsp,
             trace_filter: None,
-            ripple: 1.0,
+            logging: CurrentLogging::INSTANT,
             start: 0.0,
             position: vec![0.0; count],
             velocity: vec![0.0; count],

@@ -2,6 +2,23 @@
 
 use super::feedforward_mode::FeedforwardMode;
 
+/// Current that a control logs at a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CurrentLogging {
+    /// Share of the ripple that the setpoints cause within a position cycle: 1 for the current of an instant, 0 for the mean
+    /// over a cycle around the sample.
+    pub ripple: f64,
+    /// Time of that instant behind the sample, s.
+    pub offset: f64,
+}
+
+impl CurrentLogging {
+    /// Current of the instant of the sample.
+    pub const INSTANT: Self = CurrentLogging { ripple: 1.0, offset: 0.0 };
+    /// Mean over a position cycle.
+    pub const MEAN: Self = CurrentLogging { ripple: 0.0, offset: 0.0 };
+}
+
 /// Section of a recording that starts at rest and can be simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
@@ -22,9 +39,7 @@ pub struct Experiment {
     pub(super) period: f64,
     /// Half-power frequency, Hz, of the low-pass filter of the control.
     pub(super) trace_filter: Option<f64>,
-    /// Share of the ripple of the position cycle in the recorded current: 1 for the current of an instant, 0 for the mean
-    /// over a cycle.
-    pub(super) ripple: f64,
+    pub(super) logging: CurrentLogging,
     /// Time of the first sample in the recording, s.
     pub start: f64,
     /// Recorded position, m or rad.

@@ -1,6 +1,7 @@
 //! Result of an identification.
 
 use super::delays::DelayFit;
+use super::experiment::CurrentLogging;
 use super::feedforward::FeedforwardFit;
 use super::feedforward_mode::FeedforwardMode;
 use super::friction::FrictionFit;
@@ -54,9 +55,8 @@ pub struct Identification {
     pub active_feedforward: Vec<FeedforwardMode>,
     /// Torque constant, N·m/A (force constant, N/A), from recorded torque and current, with its standard error.
     pub torque_constant: Option<(f64, f64)>,
-    /// Share of the ripple of the position cycle in the recorded current and its standard error: 1 for the current of an
-    /// instant, 0 for a mean; none if it was not identified.
-    pub current_ripple: Option<(f64, f64)>,
+    /// Logging of the current; none if it was not identified.
+    pub current_logging: Option<CurrentLogging>,
     /// Findings.
     pub findings: Vec<Finding>,
 }
@@ -70,9 +70,9 @@ impl Identification {
         (!is_known).then_some(masses.total)
     }
 
-    /// Returns the share of the ripple of the position cycle in the recorded current.
-    pub(super) fn ripple(&self) -> f64 {
-        self.current_ripple.map_or(0.0, |(share, _)| share)
+    /// Returns the logging of the current, a mean if it was not identified.
+    pub(super) fn current_logging(&self) -> CurrentLogging {
+        self.current_logging.unwrap_or(CurrentLogging::MEAN)
     }
 
     /// Returns the identified axis parameters.

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::closed_loop::position_residuals;
 use super::covariance::posterior_covariance;
 use super::delays::correlation_inflation;
-use super::experiment::Experiment;
+use super::experiment::{CurrentLogging, Experiment};
 use super::feedforward_mode::FeedforwardMode;
 use super::fit::{BoundedParameter, Effort, descend};
 use super::loop_parameter::{LoopParameter, apply, prior};
@@ -49,6 +49,12 @@ const PERMITTED: f64 = 1e-3;
 /// Relative change of the cost below which a minimum is reached, and largest number of searches for it.
 const CONVERGED: f64 = 2e-3;
 const SEARCHES: usize = 4;
+/// Least step of an encoder, m or rad, above the rounding of positions; ratio of a difference to it up to which the
+/// difference is compared, its tolerance, and the share of whole ratios of a quantized position.
+const LEAST_STEP: f64 = 1e-11;
+const MANY_STEPS: f64 = 100.0;
+const WHOLE_STEPS: f64 = 0.05;
+const QUANTIZED: f64 = 0.9;
 /// Longest duration of a recording for the search, s.
 const SEARCHED: f64 = 6.0;
 /// Velocity cycles by which β and γ are moved, since they act at velocity cycles only.
@@ -76,6 +82,8 @@ pub(super) struct LoopFit {
     pub correlations: DMatrix<f64>,
     /// RMS position residual with the gain of the machine file, if the gain was fitted.
     pub rms_with_given_gain: Option<f64>,
+    /// Axes with other position cycles that explain the positions about as well.
+    pub alternatives: Vec<(AxisConfig, Periods)>,
     /// VFFW and lag (s) at both ends of the valley in which the residual hardly changes.
     pub valley: Option<[(f64, f64); 2]>,
 }
@@ -103,12 +111,21 @@ struct Candidate {
     cost: f64,
 }
 
+impl LoopFit {
+    /// Returns true if the lag is no whole number of position cycles.
+    pub fn is_between_cycles(&self) -> bool {
+        let lag = self.values.iter().find(|value| value.parameter == LoopParameter::Lag);
+        lag.is_some_and(|lag| !divides(self.periods.position, lag.value))
+    }
+}
+
 impl LoopProblem<'_> {
     fn experiments(&self, periods: &Periods, shift: f64) -> Vec<Experiment> {
         let all = self.recordings.iter().enumerate();
         let of = |(k, (signals, mode)): (usize, &(&Signals, FeedforwardMode))| {
             let mut left = self.duration;
-            let mut experiments = trace_experiments(signals, k, periods, (*mode, shift, 1.0));
+            let mut experiments =
+                trace_experiments(signals, k, periods, (*mode, shift, CurrentLogging::INSTANT));
             experiments.retain_mut(|experiment| {
                 let is_used = left > 0.0;
                 experiment.shorten(left.max(0.0));
@@ -376,13 +393,24 @@ impl LoopProblem<'_> {
         // Long recordings are searched in part only.
         let search = LoopProblem { duration: SEARCHED, ..*self };
         let first = search.best(axis, start, &parameters, lag)?;
-        let (periods, free) = search.best_cycle((axis, given), &cycles, &parameters, first);
+        let (periods, free, others) = search.best_cycle((axis, given), &cycles, &parameters, first);
+        let others = others.iter().filter(|(other, _)| other.position != periods.position);
+        let alternatives =
+            others.map(|(other, found)| (apply(axis, other, &parameters, &found.values).0, *other));
+        let alternatives = alternatives.collect();
         let free = search.polish(axis, &periods, &parameters, free);
         // A residual below that of usual encoders outweighs the prior.
         let noise = self.correlated_noise(axis, &periods, &parameters, &free.values)?;
         let problem = LoopProblem { noise: noise.min(self.noise), ..*self };
         let free = problem.converge(axis, &periods, &parameters, &free.values)?;
-        problem.finish((axis, &periods), parameters, free)
+        let found = problem.finish((axis, &periods), parameters, free)?;
+        Some(LoopFit { alternatives, ..found })
+    }
+
+    /// Returns the RMS error of a position by the coarsest encoder resolution of the recordings, m or rad.
+    fn resolution(&self) -> f64 {
+        let steps = self.recordings.iter().map(|(signals, _)| encoder_step(signals));
+        steps.fold(0.0, f64::max) / 12.0_f64.sqrt()
     }
 
     /// Rounds the minimum `free` to the delays that a machine file can have, and determines its errors.
@@ -434,6 +462,7 @@ impl LoopProblem<'_> {
             }),
             rms: (last.cost / count).sqrt(),
             rms_with_given_gain: rms_with_given_gain.map(|cost| (cost / count).sqrt()),
+            alternatives: Vec::new(),
             valley: self.valley(&found, periods, free.values[0]),
             axis: found,
             periods: *periods,
@@ -459,8 +488,10 @@ impl LoopProblem<'_> {
         Some(fit)
     }
 
-    /// Returns the position cycle with the least residual and its minimum. Among cycles with about the same residual, the
-    /// renewal of the signals is preferred, then that of the machine file if it divides the lag, then the first one.
+    /// Returns the position cycle with the least residual, its minimum, and the cycles with about the same residual.
+    /// Residuals below the resolution of the encoder or the error of interpolated setpoints count alike. Among cycles with
+    /// about the same residual, the renewal of the signals is preferred, then that of the machine file if it divides the
+    /// lag, then the first one.
     ///
     /// A motion shows β + Tsp, so the others start with β changed by the difference of the cycles.
     fn best_cycle(
@@ -469,8 +500,8 @@ impl LoopProblem<'_> {
         cycles: &[Periods],
         parameters: &[LoopParameter],
         first: Candidate,
-    ) -> (Periods, Candidate) {
-        let Some(start) = cycles.first() else { return (*given, first) };
+    ) -> (Periods, Candidate, Vec<(Periods, Candidate)>) {
+        let Some(start) = cycles.first() else { return (*given, first, Vec::new()) };
         let others = cycles.iter().skip(1).filter_map(|periods| {
             let change = seconds(start.position) - seconds(periods.position);
             let from = parameters.iter().zip(&first.values).map(|(parameter, value)| match parameter {
@@ -482,11 +513,15 @@ impl LoopProblem<'_> {
         });
         let mut all: Vec<(Periods, Candidate)> = others.collect();
         all.push((*start, first.clone()));
+        let count = self.experiments(start, 0.0).iter().map(|e| e.position.len()).sum::<usize>() as f64;
         let least = all.iter().map(|(_, found)| found.cost).fold(f64::INFINITY, f64::min);
+        let interpolation = cycles.iter().map(|periods| self.interpolation(periods)).fold(0.0, f64::max);
+        let floor = self.resolution().hypot(interpolation);
+        let least = least.max(count * floor.powi(2));
         let renewal = self.renewal(given);
         let limit = |periods: &Periods| if Some(periods.position) == renewal { RENEWED } else { KEPT };
-        let close = all.into_iter().filter(|(periods, found)| found.cost <= limit(periods).powi(2) * least);
-        let preference = |(periods, found): &(Periods, Candidate)| {
+        all.retain(|(periods, found)| found.cost <= limit(periods).powi(2) * least);
+        let preference = |(periods, found): &&(Periods, Candidate)| {
             let cycle = periods.position;
             let is_dividing = divides(cycle, found.values[0]);
             (
@@ -497,7 +532,8 @@ impl LoopProblem<'_> {
                 cycle,
             )
         };
-        close.max_by_key(preference).unwrap_or((*start, first))
+        let (periods, best) = all.iter().max_by_key(preference).cloned().unwrap_or((*start, first));
+        (periods, best, all)
     }
 
     /// Returns the minimum with the gain of the machine file, and its parameters; none if the gain is not fitted.
@@ -527,11 +563,16 @@ impl LoopProblem<'_> {
         let left = self.residuals(axis, periods, parameters, values)?;
         let data = left.as_slice().get(..left.len().checked_sub(parameters.len())?)?;
         let noise = rms(data.iter().copied())? * correlation_inflation(data).sqrt();
+        Some(noise.hypot(self.interpolation(periods)))
+    }
+
+    /// Returns the error of the setpoints that are interpolated between samples, m or rad.
+    fn interpolation(&self, periods: &Periods) -> f64 {
         let tsp = seconds(periods.position);
         let coarse = self.recordings.iter().filter(|(signals, _)| signals.period > (1.0 + PERMITTED) * tsp);
         let setpoints =
             coarse.flat_map(|(signals, _)| &signals.spans).filter_map(|span| span.psec.as_deref());
-        Some(setpoints.map(interpolation_error).fold(noise, f64::hypot))
+        setpoints.map(interpolation_error).fold(0.0, f64::hypot)
     }
 
     fn covariance(
@@ -574,6 +615,18 @@ impl LoopProblem<'_> {
         let slope = covariance[(0, 1)] / covariance[(1, 1)];
         Some([-half, half].map(|change| (weight + change, lag + slope * change)))
     }
+}
+
+/// Returns the step of a quantized position, m or rad; 0 if the differences of neighboring samples are no multiples of one.
+fn encoder_step(signals: &Signals) -> f64 {
+    let differences = || {
+        let spans = signals.spans.iter().flat_map(|span| span.position.windows(2));
+        spans.map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > LEAST_STEP)
+    };
+    let step = differences().fold(f64::INFINITY, f64::min);
+    let small: Vec<f64> = differences().map(|d| d / step).filter(|ratio| *ratio < MANY_STEPS).collect();
+    let whole = small.iter().filter(|ratio| (*ratio - ratio.round()).abs() < WHOLE_STEPS).count();
+    if whole as f64 >= QUANTIZED * small.len().max(1) as f64 { step } else { 0.0 }
 }
 
 /// Returns true if a parameter is fitted again with the rounded lag. The gain with which VFFW represents a part of the lag

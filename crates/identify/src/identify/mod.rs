@@ -48,7 +48,7 @@ pub use axis_identification::{
 };
 pub use closed_loop::{find_experiments, simulate, simulate_all};
 pub use delays::{DelayFit, DelayParameter};
-pub use experiment::{Experiment, SimulatedExperiment};
+pub use experiment::{CurrentLogging, Experiment, SimulatedExperiment};
 pub use feedforward::{FeedforwardFit, FeedforwardRegression, fit_feedforward};
 pub use feedforward_mode::FeedforwardMode;
 pub use friction::{Breakaway, FrictionFit, FrictionLaw, LawFit, fit_friction};

@@ -1,15 +1,18 @@
 //! Inertia, friction and gravity from any motion, by regression of the current.
 //!
-//! `i = Jeq a / (Kt r) + s f(|V|) + C_gravity / Kt + ρ i_ripple + δ di/dt` (Prévost eqs. 1 to 3) over all samples in motion.
-//! i_ripple is the difference between the current of an instant and the mean over a position cycle, by simulation of the
-//! closed loop; its share ρ and the lag δ of the current are fitted with a prior, since a recording does not say how the
-//! control logs its current. The friction law is parametrized such that a + c ≥ 0 and d < b always hold. Each standstill
+//! `i = Jeq (a + ρ a_ripple) / (Kt r) + s f(|V|) + C_gravity / Kt + δ di/dt` (Prévost eqs. 1 to 3) over all samples in
+//! motion. a_ripple is the difference between the acceleration of an instant and the mean over a position cycle, by
+//! simulation of the closed loop; its factor ρ and the lag δ of the current are fitted with a prior. A recording does not
+//! say how the control logs its current: a mean and instants of the cycle are compared by their residuals, and the standard
+//! errors contain the differences between those that explain the current alike. The friction law is parametrized such that a + c ≥ 0 and d < b always hold. Each standstill
 //! bounds the gravity: friction holds any current within ±i0 around it.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::covariance::posterior_covariance;
 use super::delays::correlation_inflation;
+use super::experiment::CurrentLogging;
 use super::fit::{BoundedParameter, Effort, descend, r_squared};
 use super::friction::{FrictionFit, FrictionLaw, LawFit, friction_current};
 use super::gravity::{GravityCurrent, GravityFit, GravitySource};
@@ -44,13 +47,20 @@ const SIGNIFICANT: f64 = 3.0;
 /// Gravity relative to friction below which it is neglected.
 const RELEVANT: f64 = 0.02;
 /// Center and standard deviation of the prior of −c / a, b in min/m and ln(−d m/min), within which the axes of Prévost
-/// Appendix 2 lie; of the share of the ripple, from that of a mean to that of an instant; of the lag of the current, s.
-const PRIOR: [(f64, f64); 5] = [(0.35, 0.2), (0.016, 0.01), (-1.1, 0.5), (0.4, 0.5), (0.0, 0.25e-3)];
+/// Appendix 2 lie; of the factor of the simulated ripple, with the deviation 1 instead of that of the simulation; of the lag
+/// of the current, s.
+const PRIOR: [(f64, f64); 5] = [(0.35, 0.2), (0.016, 0.01), (-1.1, 0.5), (1.0, 1.0), (0.0, 0.1e-3)];
 /// Bounds of these.
-const BOUNDS: [(f64, f64); 5] = [(-1.0, 0.98), (0.0, 0.08), (-2.9, 1.5), (-1.0, 1.2), (-1e-3, 1e-3)];
-/// Index of the share of the ripple, and its standard error beyond that of the fit.
+const BOUNDS: [(f64, f64); 5] = [(-1.0, 0.98), (0.0, 0.08), (-2.9, 1.5), (0.0, 2.0), (-1e-3, 1e-3)];
+/// Index of the factor of the ripple, and that of its prior.
 const RIPPLE: usize = 6;
-const RIPPLE_ERROR: f64 = 0.25;
+const RIPPLE_PRIOR: usize = 3;
+/// Longest distance of the samples of the regression, s: a tenth of the length of its filter.
+const THINNED: f64 = 2e-3;
+/// Probability from which on the current shows another position cycle.
+const CERTAIN: f64 = 0.95;
+/// Passes of a comparison, whose prior depends on the inertia.
+const LINEAR_PASSES: usize = 3;
 /// Noise of the current in the first pass and least noise in the second one, relative to the largest current.
 const NOISE: f64 = 0.01;
 const LEAST_NOISE: f64 = 2e-3;
@@ -59,6 +69,34 @@ const COLLINEAR: f64 = 0.95;
 
 /// Ripple of the current at each sample of each span of each recording, A; NaN where it is unknown.
 pub(super) type CurrentRipple = Vec<Vec<Vec<f64>>>;
+
+/// Instant of a position cycle at which a control can log the current.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct LoggedInstant {
+    /// Time behind the sample, s.
+    pub offset: f64,
+    /// Index of the position cycle among those that are compared, 0 for the identified one.
+    pub cycle: usize,
+    /// Probability before the comparison.
+    pub prior: f64,
+    /// True if β of the simulation is that of the axis: others widen the standard errors only.
+    pub is_identified: bool,
+    /// Simulated current of the instant minus the mean over a position cycle.
+    pub ripple: CurrentRipple,
+    /// Inertia of the simulation, kg·m².
+    pub inertia: f64,
+}
+
+/// Ways in which a control can log the current.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CurrentLoggings {
+    /// Instants; a mean over a position cycle has the rest of the probability.
+    pub instants: Vec<LoggedInstant>,
+    /// Relative standard error of the simulated ripple.
+    pub error: f64,
+    /// True if the phase of the samples in the position cycles is known. Otherwise all ways remain as probable as before.
+    pub is_phase_known: bool,
+}
 
 /// Result of the regression.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,8 +109,10 @@ pub(super) struct PlantRegression {
     pub gravity: GravityFit,
     /// Coefficient of determination R² over the samples in motion.
     pub r_squared: f64,
-    /// Share of the ripple in the recorded current and its standard error; none without ripple.
-    pub ripple: Option<(f64, f64)>,
+    /// Logging of the current; none if none was compared.
+    pub logging: Option<CurrentLogging>,
+    /// Index of the position cycle of the logging among those that were compared.
+    pub cycle: usize,
     /// Pairs of collinear parameters with their correlation.
     pub collinear: Vec<(&'static str, &'static str, f64)>,
 }
@@ -84,8 +124,9 @@ const NAMES: [&str; 6] = ["inertia", "gravity", "friction.a", "friction.c", "fri
 struct Sample {
     acceleration: f64,
     current: f64,
-    /// Derivative of the filtered current, A/s, and filtered ripple, A.
+    /// Derivative of the filtered current, A/s.
     slope: f64,
+    /// Filtered ripple of the acceleration, m/s² or rad/s².
     ripple: f64,
     /// First of the fine speeds around the sample.
     from: usize,
@@ -93,6 +134,8 @@ struct Sample {
     /// Number of the move.
     cluster: usize,
     span: usize,
+    /// Number of the span in the recording.
+    number: usize,
     /// Index in the span.
     index: usize,
 }
@@ -111,7 +154,13 @@ struct MovingData {
 }
 
 impl MovingData {
-    fn new(recordings: &[&Signals], axis: &AxisConfig, ripple: Option<&CurrentRipple>) -> Option<Self> {
+    /// Selects the samples in motion, at most one per `distance` s, where `known` is finite.
+    fn new(
+        recordings: &[&Signals],
+        axis: &AxisConfig,
+        distance: f64,
+        known: Option<&CurrentRipple>,
+    ) -> Option<Self> {
         let mut data = MovingData {
             samples: Vec::new(),
             speeds: Vec::new(),
@@ -129,8 +178,9 @@ impl MovingData {
             let sum: f64 = (0..=2 * radius).map(gauss).sum();
             data.weights.push((0..=2 * radius).map(|k| gauss(k) / sum).collect());
             for (number, span) in signals.spans.iter().enumerate() {
-                let ripple = ripple.and_then(|all| all.get(recording)?.get(number)).map(Vec::as_slice);
-                data.add((span, ripple), signals.period, steps, axis);
+                let known = known.and_then(|all| all.get(recording)?.get(number)).map(Vec::as_slice);
+                let thinning = ((distance / signals.period + 1e-9) as usize).max(1);
+                data.add((span, number, known), (signals.period, steps, thinning), axis);
             }
         }
         (data.samples.len() >= FEWEST_SAMPLES).then_some(data)
@@ -138,9 +188,8 @@ impl MovingData {
 
     fn add(
         &mut self,
-        (span, ripple): (&SignalSpan, Option<&[f64]>),
-        period: f64,
-        steps: usize,
+        (span, number, known): (&SignalSpan, usize, Option<&[f64]>),
+        (period, steps, thinning): (f64, usize, usize),
         axis: &AxisConfig,
     ) {
         let (Some(current), Some(raw)) = (&span.smooth_current, &span.current) else { return };
@@ -173,23 +222,25 @@ impl MovingData {
             } else {
                 self.add_standstill(&mut standing);
             }
-            let ripple = ripple.map_or(0.0, |ripple| ripple.get(i).copied().unwrap_or(f64::NAN));
-            let is_known = current[i].is_finite() && raw[i].is_finite() && raw[i].abs() < limit;
+            let is_simulated = known.is_none_or(|known| known.get(i).is_some_and(|value| value.is_finite()));
+            let is_known =
+                is_simulated && current[i].is_finite() && raw[i].is_finite() && raw[i].abs() < limit;
             let last = current.len().saturating_sub(1);
             let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
             let slope = (current[after] - current[before]) / ((after - before).max(1) as f64 * period);
             if let (Some((from, _)), true) =
-                (window.filter(|_| direction != 0.0), is_known && ripple.is_finite() && slope.is_finite())
+                (window.filter(|_| direction != 0.0), is_known && slope.is_finite() && i % thinning == 0)
             {
                 self.samples.push(Sample {
                     acceleration: span.acceleration[i],
                     current: current[i],
                     slope,
-                    ripple,
+                    ripple: 0.0,
                     from,
                     recording,
                     cluster: self.moves,
                     span: self.speeds.len(),
+                    number,
                     index: i,
                 });
             }
@@ -241,8 +292,8 @@ impl MovingData {
             .iter()
             .zip(friction)
             .map(|(sample, friction)| {
-                let logged = x[RIPPLE] * sample.ripple - x[7] * sample.slope;
-                x[0] * sample.acceleration + x[1] + friction + logged
+                let acceleration = sample.acceleration + x[RIPPLE] * sample.ripple;
+                x[0] * acceleration + x[1] + friction - x[7] * sample.slope
             })
             .collect()
     }
@@ -274,7 +325,7 @@ pub(super) struct MovingCurrent {
 /// Computes the filtered current of a linear or rotary axis at the samples in motion.
 pub(super) fn moving_current(signals: &Signals, axis: &AxisConfig) -> Vec<MovingCurrent> {
     let signals = &smoothed(signals);
-    let Some(data) = MovingData::new(&[signals], axis, None) else { return Vec::new() };
+    let Some(data) = MovingData::new(&[signals], axis, 0.0, None) else { return Vec::new() };
     let gravity = Gravity::new(&axis.gravity, axis.transmission_ratio);
     let (kt, r) = (axis.motor.torque_constant, axis.transmission_ratio);
     let spans: Vec<&SignalSpan> = signals.spans.iter().filter(|span| span.smooth_current.is_some()).collect();
@@ -319,24 +370,17 @@ fn smoothed(signals: &Signals) -> Signals {
     Signals { cutoff: CUTOFF, spans: signals.spans.iter().map(of).collect(), ..signals.clone() }
 }
 
-/// Fits inertia, friction and gravity, with the unfiltered ripple of the current if it is known; none if the axis hardly
-/// moves. A gravity that is not significant, or that of a rotary axis, which a constant does not describe, is that of the
-/// model without it.
+/// Fits inertia, friction and gravity, with the ways in which the control can log the current if they are known; none if the
+/// axis hardly moves. A gravity that is not significant, or that of a rotary axis, which a constant does not describe, is
+/// that of the model without it.
 pub(super) fn fit_plant(
     recordings: &[&Signals],
     axis: &AxisConfig,
-    ripple: Option<&CurrentRipple>,
+    loggings: Option<&CurrentLoggings>,
 ) -> Option<PlantRegression> {
     let smooth: Vec<Signals> = recordings.iter().map(|signals| smoothed(signals)).collect();
-    let ripple = ripple.map(|all| -> CurrentRipple {
-        let of = |(signals, spans): (&Signals, &Vec<Vec<f64>>)| {
-            let filter = GaussianFilter::new(signals.cutoff, signals.period);
-            spans.iter().map(|ripple| filtered(&filter, ripple)).collect()
-        };
-        smooth.iter().zip(all).map(of).collect()
-    });
     let recordings: Vec<&Signals> = smooth.iter().collect();
-    let free = fit_plant_by_regression(&recordings, axis, ripple.as_ref(), true)?;
+    let free = fit_plant_by_regression(&recordings, axis, loggings, true)?;
     let (value, error) = (free.gravity.current.constant.abs(), free.gravity.error.constant);
     let law = &free.friction.law.config;
     let is_kept = axis.kind() == AxisKind::Linear
@@ -345,7 +389,7 @@ pub(super) fn fit_plant(
     if is_kept {
         return Some(free);
     }
-    let mut fixed = fit_plant_by_regression(&recordings, axis, ripple.as_ref(), false)?;
+    let mut fixed = fit_plant_by_regression(&recordings, axis, loggings, false)?;
     if axis.kind() == AxisKind::Linear {
         // The weight that is set to zero is as uncertain as before, and with it what the motion does not separate from it.
         fixed.friction.law = fixed.friction.law.with_errors_of(&free.friction.law);
@@ -356,75 +400,264 @@ pub(super) fn fit_plant(
     Some(fixed)
 }
 
-/// Returns the filtered signal between missing values at its ends.
-fn filtered(filter: &GaussianFilter, signal: &[f64]) -> Vec<f64> {
-    let is_known = |value: &f64| value.is_finite();
-    let from = signal.iter().position(is_known).unwrap_or(signal.len());
-    let to = signal.iter().rposition(is_known).map_or(from, |last| last + 1);
-    let mut smooth = vec![f64::NAN; signal.len()];
-    let known = filter.apply(&signal[from..to]).value;
-    smooth.iter_mut().skip(from).zip(known).for_each(|(to, value)| *to = value);
-    smooth
-}
-
 fn fit_plant_by_regression(
     recordings: &[&Signals],
     axis: &AxisConfig,
-    ripple: Option<&CurrentRipple>,
+    loggings: Option<&CurrentLoggings>,
     has_gravity: bool,
 ) -> Option<PlantRegression> {
-    let data = MovingData::new(recordings, axis, ripple)?;
+    let known = loggings.and_then(|loggings| loggings.instants.first()).map(|instant| &instant.ripple);
+    let mut data = MovingData::new(recordings, axis, THINNED, known)?;
     let measured = data.measured(recordings, axis);
-    let largest = measured.iter().fold(0.0_f64, |most, i| most.max(i.abs())).max(f64::MIN_POSITIVE);
-    let fastest = data.samples.iter().fold(0.0_f64, |most, s| most.max(s.acceleration.abs()));
-    let bounded = |start: f64, low: f64, high: f64| BoundedParameter {
-        start: start.clamp(low, high),
-        low,
-        high,
-        step: 1e-5 * (high - low),
-    };
-    let factor = 3.0 * largest / fastest.max(f64::MIN_POSITIVE);
-    let prior_of = |k: usize| {
-        let ((center, _), (low, high)) = (PRIOR[k], BOUNDS[k]);
-        // Without ripple its share is nothing.
-        if k == 3 && ripple.is_none() { bounded(0.0, -1e-9, 1e-9) } else { bounded(center, low, high) }
-    };
-    let mut parameters = vec![
-        bounded(0.3 * factor, 0.0, factor),
-        if has_gravity { bounded(0.0, -2.0 * largest, 2.0 * largest) } else { bounded(0.0, -1e-9, 1e-9) },
-        bounded(0.2 * largest, 0.0, 3.0 * largest),
-    ];
-    parameters.extend((0..PRIOR.len()).map(prior_of));
-    let rows = measured.len() + data.standstills.len() + PRIOR.len();
-    let residuals = |x: &[f64], noise: f64| {
-        let left = data.modeled(x).into_iter().zip(&measured).map(|(model, measured)| model - measured);
-        let prior =
-            PRIOR.iter().zip(&x[3..]).map(|((center, deviation), x)| noise * (x - center) / deviation);
-        let held = data.excesses(x);
-        Some(DVector::from_iterator(rows, left.chain(held).chain(prior)))
-    };
-    // The noise counts with the correlation of neighboring samples.
-    let mut noise = NOISE * largest;
-    let mut values: Vec<f64> = Vec::new();
-    for _ in 0..2 {
-        (values, _) = descend(&parameters, Effort::Formula, |x| residuals(x, noise))?;
-        let left = residuals(&values, noise)?;
-        let left = left.as_slice().get(..measured.len())?;
-        let count = left.len() as f64;
-        let freedom = (count / (count - DETERMINED).max(1.0)).sqrt();
-        noise = freedom * rms(left.iter().copied())? * correlation_inflation(left).sqrt();
-        noise = noise.max(LEAST_NOISE * largest);
-        parameters.iter_mut().zip(&values).for_each(|(parameter, value)| parameter.start = *value);
+    let mut fit = data.fit(&measured, None, has_gravity)?;
+    let mut logging = loggings.map(|_| CurrentLogging::MEAN);
+    let (mut spread, mut cycle) = (None, 0);
+    if let Some(loggings) = loggings {
+        let per_current = axis.motor.torque_constant * axis.transmission_ratio;
+        let ripple_of = |instant| data.ripple_of(recordings, instant, per_current);
+        let columns: Vec<Vec<f64>> = loggings.instants.par_iter().map(ripple_of).collect();
+        let compared = data.compare(&measured, (&fit, has_gravity), (loggings, &columns));
+        spread = Some(compared.spread);
+        if let Some(k) = compared.best {
+            data.samples.iter_mut().zip(&columns[k]).for_each(|(sample, ripple)| sample.ripple = *ripple);
+            fit = data.fit(&measured, Some(loggings.error), has_gravity)?;
+            cycle = loggings.instants[k].cycle;
+            logging =
+                Some(CurrentLogging { ripple: fit.values[RIPPLE], offset: loggings.instants[k].offset });
+        }
     }
     let clusters: Vec<Option<usize>> = data.samples.iter().map(|sample| Some(sample.cluster)).collect();
-    let mut covariance =
-        posterior_covariance(&parameters, &values, |x| residuals(x, noise), &clusters, noise)?;
-    if ripple.is_some() {
-        // The others follow the share of the ripple, which the simulated loop does not determine exactly.
-        let along = covariance.column(RIPPLE) / covariance[(RIPPLE, RIPPLE)];
-        covariance += &along * along.transpose() * RIPPLE_ERROR.powi(2);
+    let residuals = |x: &[f64]| Some(data.residuals(x, &measured, (fit.noise, fit.ripple)));
+    let covariance = posterior_covariance(&fit.parameters, &fit.values, residuals, &clusters, fit.noise)?;
+    Some(PlantRegression {
+        logging,
+        cycle,
+        ..result(&data, &measured, axis, &fit.values, (covariance, spread))
+    })
+}
+
+/// Fit of the current at the samples in motion.
+struct CurrentFit {
+    parameters: Vec<BoundedParameter>,
+    values: Vec<f64>,
+    /// Standard deviation of a residual that counts as independent, A.
+    noise: f64,
+    /// Relative standard error of the ripple; none without ripple.
+    ripple: Option<f64>,
+}
+
+/// Comparison of the ways in which a control can log the current.
+struct ComparedLoggings {
+    /// Index of the most probable instant of the identified position cycle; none for a mean.
+    best: Option<usize>,
+    /// Covariance of inertia, gravity and friction by the differences of the probable ways from the best one.
+    spread: DMatrix<f64>,
+}
+
+impl MovingData {
+    /// Returns the residuals of the samples, of the standstills and of the prior, A.
+    fn residuals(&self, x: &[f64], measured: &[f64], (noise, ripple): (f64, Option<f64>)) -> DVector<f64> {
+        let left = self.modeled(x).into_iter().zip(measured).map(|(model, measured)| model - measured);
+        let prior = PRIOR.iter().zip(&x[3..]).enumerate().map(|(k, ((center, deviation), x))| {
+            let deviation = if k == RIPPLE_PRIOR { ripple.unwrap_or(*deviation) } else { *deviation };
+            noise * (x - center) / deviation
+        });
+        let rows = measured.len() + self.standstills.len() + PRIOR.len();
+        DVector::from_iterator(rows, left.chain(self.excesses(x)).chain(prior))
     }
-    Some(result(&data, &measured, axis, (&values, ripple.is_some()), covariance))
+
+    /// Returns the noise of the residuals of the samples, which counts with the correlation of neighbors, A.
+    fn noise(left: &[f64], largest: f64) -> Option<f64> {
+        let count = left.len() as f64;
+        let freedom = (count / (count - DETERMINED).max(1.0)).sqrt();
+        let noise = freedom * rms(left.iter().copied())? * correlation_inflation(left).sqrt();
+        Some(noise.max(LEAST_NOISE * largest))
+    }
+
+    /// Fits the current `measured` with the ripple of the samples, whose relative standard error is `ripple`.
+    fn fit(&self, measured: &[f64], ripple: Option<f64>, has_gravity: bool) -> Option<CurrentFit> {
+        let largest = largest(measured);
+        let fastest = self.samples.iter().fold(0.0_f64, |most, s| most.max(s.acceleration.abs()));
+        let bounded = |start: f64, low: f64, high: f64| BoundedParameter {
+            start: start.clamp(low, high),
+            low,
+            high,
+            step: 1e-5 * (high - low),
+        };
+        let factor = 3.0 * largest / fastest.max(f64::MIN_POSITIVE);
+        let prior_of = |k: usize| {
+            let ((center, _), (low, high)) = (PRIOR[k], BOUNDS[k]);
+            // Without ripple its factor is nothing.
+            if k == RIPPLE_PRIOR && ripple.is_none() {
+                bounded(0.0, -1e-9, 1e-9)
+            } else {
+                bounded(center, low, high)
+            }
+        };
+        let mut parameters = vec![
+            bounded(0.3 * factor, 0.0, factor),
+            if has_gravity { bounded(0.0, -2.0 * largest, 2.0 * largest) } else { bounded(0.0, -1e-9, 1e-9) },
+            bounded(0.2 * largest, 0.0, 3.0 * largest),
+        ];
+        parameters.extend((0..PRIOR.len()).map(prior_of));
+        let mut noise = NOISE * largest;
+        let mut values: Vec<f64> = Vec::new();
+        for _ in 0..2 {
+            let residuals = |x: &[f64]| Some(self.residuals(x, measured, (noise, ripple)));
+            (values, _) = descend(&parameters, Effort::Formula, residuals)?;
+            let left = self.residuals(&values, measured, (noise, ripple));
+            noise = Self::noise(left.as_slice().get(..measured.len())?, largest)?;
+            parameters.iter_mut().zip(&values).for_each(|(parameter, value)| parameter.start = *value);
+        }
+        Some(CurrentFit { parameters, values, noise, ripple })
+    }
+
+    /// Returns the filtered ripple of the acceleration at each sample, m/s² or rad/s²; `per_current` is Kt r.
+    fn ripple_of(&self, recordings: &[&Signals], instant: &LoggedInstant, per_current: f64) -> Vec<f64> {
+        let filters: Vec<GaussianFilter> =
+            recordings.iter().map(|signals| GaussianFilter::new(signals.cutoff, signals.period)).collect();
+        let scale = per_current / instant.inertia;
+        let at = |sample: &Sample| {
+            let ripple = instant.ripple.get(sample.recording)?.get(sample.number)?;
+            // Close to the ends of the simulation the filter lacks values.
+            let smooth =
+                filters[sample.recording].value_at(ripple, sample.index).filter(|value| value.is_finite());
+            smooth.or_else(|| ripple.get(sample.index).copied()).map(|value| scale * value)
+        };
+        self.samples.iter().map(|sample| at(sample).unwrap_or(0.0)).collect()
+    }
+
+    /// Compares the ways in which the control can log the current by linear least squares around `fit`, that of a mean.
+    /// `columns` are the ripples of the instants.
+    fn compare(
+        &self,
+        measured: &[f64],
+        (fit, has_gravity): (&CurrentFit, bool),
+        (loggings, columns): (&CurrentLoggings, &[Vec<f64>]),
+    ) -> ComparedLoggings {
+        let x = &fit.values;
+        let friction = |x: &[f64]| DVector::from_vec(self.friction(&law_of(x)));
+        let mut right = DVector::from_column_slice(measured) - friction(x);
+        let mut design =
+            vec![DVector::from_iterator(measured.len(), self.samples.iter().map(|s| s.acceleration))];
+        design.push(DVector::from_element(measured.len(), if has_gravity { 1.0 } else { 0.0 }));
+        for k in 2..RIPPLE {
+            let (step, mut moved) = (fit.parameters[k].step, x.clone());
+            moved[k] = x[k] + step;
+            let above = friction(&moved);
+            moved[k] = x[k] - step;
+            let column = (above - friction(&moved)) / (2.0 * step);
+            right.axpy(x[k], &column, 1.0);
+            design.push(column);
+        }
+        design.push(DVector::from_iterator(measured.len(), self.samples.iter().map(|s| -s.slope)));
+        let design = DMatrix::from_columns(&design);
+        let size = design.ncols();
+        let (gram, projected, square) = (design.tr_mul(&design), design.tr_mul(&right), right.norm_squared());
+        // Solutions: values, and cost without that of the mean; none for a mean.
+        let solve = |ripple: Option<&Vec<f64>>, noise: f64| -> Option<(DVector<f64>, f64)> {
+            let mut full = gram.clone().resize(size + 1, size + 1, 0.0);
+            let mut vector = projected.clone().resize_vertically(size + 1, 0.0);
+            if let Some(ripple) = ripple {
+                let ripple = DVector::from_column_slice(ripple);
+                let with = design.tr_mul(&ripple);
+                for k in 0..size {
+                    full[(k, size)] = with[k];
+                    full[(size, k)] = with[k];
+                }
+                full[(size, size)] = ripple.norm_squared();
+                vector[size] = ripple.dot(&right);
+            }
+            let mut constant = square;
+            for (k, (center, deviation)) in PRIOR.iter().enumerate().filter(|(k, _)| *k != RIPPLE_PRIOR) {
+                let (at, weight) =
+                    (if k < RIPPLE_PRIOR { k + 3 } else { size - 1 }, (noise / deviation).powi(2));
+                full[(at, at)] += weight;
+                vector[at] += weight * center;
+                constant += weight * center * center;
+            }
+            if !has_gravity {
+                full[(1, 1)] += 1.0;
+            }
+            if ripple.is_none() {
+                full[(size, size)] = 1.0;
+            }
+            let mut inertia = x[0];
+            let mut found = (DVector::zeros(size + 1), f64::INFINITY);
+            for _ in 0..LINEAR_PASSES {
+                let mut tied = full.clone();
+                if ripple.is_some() {
+                    // The coefficient of the ripple is that of the acceleration times a factor of about 1.
+                    let weight = (noise / (loggings.error * inertia.max(f64::MIN_POSITIVE))).powi(2);
+                    tied[(0, 0)] += weight;
+                    tied[(size, size)] += weight;
+                    tied[(0, size)] -= weight;
+                    tied[(size, 0)] -= weight;
+                }
+                let solution = super::fit::inverse(&tied)? * &vector;
+                let cost = constant - solution.dot(&vector);
+                inertia = solution[0];
+                found = (solution, cost);
+            }
+            (inertia > 0.0).then_some(found)
+        };
+        let largest = largest(measured);
+        let mut noise = fit.noise;
+        let mut compared: Vec<(Option<usize>, DVector<f64>, f64)> = Vec::new();
+        for _ in 0..2 {
+            let ways: Vec<Option<usize>> =
+                std::iter::once(None).chain((0..columns.len()).map(Some)).collect();
+            compared = ways
+                .into_par_iter()
+                .filter_map(|way| {
+                    let (solution, cost) = solve(way.map(|k| &columns[k]), noise)?;
+                    Some((way, solution, cost))
+                })
+                .collect();
+            let Some((way, solution, _)) = compared.iter().min_by(|a, b| a.2.total_cmp(&b.2)) else { break };
+            let mut left = &right - &design * solution.rows(0, size);
+            if let Some(k) = way {
+                left.axpy(-solution[size], &DVector::from_column_slice(&columns[*k]), 1.0);
+            }
+            noise = Self::noise(left.as_slice(), largest).unwrap_or(noise);
+        }
+        let least = compared.iter().map(|(_, _, cost)| *cost).fold(f64::INFINITY, f64::min);
+        let of_instants: f64 = loggings.instants.iter().map(|instant| instant.prior).sum();
+        let weight = |(way, _, cost): &(Option<usize>, DVector<f64>, f64)| {
+            let prior = way.map_or(1.0 - of_instants, |k| loggings.instants[k].prior);
+            let excess = if loggings.is_phase_known { cost - least } else { 0.0 };
+            prior * (-0.5 * excess / (noise * noise)).exp()
+        };
+        let sum: f64 = compared.iter().map(weight).sum();
+        let cycle_of = |way: &Option<usize>| way.map(|k| loggings.instants[k].cycle);
+        let share = |cycle: usize| {
+            let of_it = compared.iter().filter(|(way, _, _)| cycle_of(way) == Some(cycle));
+            of_it.map(weight).sum::<f64>() / sum
+        };
+        // Another position cycle than the identified one must be certain.
+        let cycles = loggings.instants.iter().map(|instant| instant.cycle).max().unwrap_or(0);
+        let cycle = (1..=cycles).find(|cycle| share(*cycle) > CERTAIN).unwrap_or(0);
+        let best = compared
+            .iter()
+            .filter(|(way, _, _)| {
+                way.is_none_or(|k| loggings.instants[k].cycle == cycle && loggings.instants[k].is_identified)
+            })
+            .max_by(|a, b| weight(a).total_cmp(&weight(b)));
+        let mut spread = DMatrix::zeros(x.len(), x.len());
+        if let Some((_, center, _)) = best.filter(|_| sum > 0.0) {
+            for way in &compared {
+                let mut change = DVector::zeros(x.len());
+                change.rows_mut(0, RIPPLE).copy_from(&(&way.1 - center).rows(0, RIPPLE));
+                spread += &change * change.transpose() * (weight(way) / sum);
+            }
+        }
+        ComparedLoggings { best: best.and_then(|(way, _, _)| *way), spread }
+    }
+}
+
+/// Returns the largest current, A.
+fn largest(measured: &[f64]) -> f64 {
+    measured.iter().fold(0.0_f64, |most, i| most.max(i.abs())).max(f64::MIN_POSITIVE)
 }
 
 /// Returns center and half width of the gravity currents that the standstills permit, A: friction holds the axis with any
@@ -445,9 +678,21 @@ fn result(
     data: &MovingData,
     measured: &[f64],
     axis: &AxisConfig,
-    (x, has_ripple): (&[f64], bool),
-    covariance: DMatrix<f64>,
+    x: &[f64],
+    (mut covariance, spread): (DMatrix<f64>, Option<DMatrix<f64>>),
 ) -> PlantRegression {
+    let mut collinear = Vec::new();
+    for j in 0..NAMES.len() {
+        for k in 0..j {
+            let rho = covariance[(j, k)] / (covariance[(j, j)] * covariance[(k, k)]).sqrt();
+            if rho.abs() > COLLINEAR {
+                collinear.push((NAMES[k], NAMES[j], rho));
+            }
+        }
+    }
+    if let Some(spread) = spread {
+        covariance += spread;
+    }
     let error = |k: usize| covariance[(k, k)].max(0.0).sqrt();
     let per_current = axis.motor.torque_constant * axis.transmission_ratio;
     let modeled = data.modeled(x);
@@ -466,15 +711,6 @@ fn result(
     let i0_error = (of_law[(0, 0)] + of_law[(2, 2)] + 2.0 * of_law[(0, 2)]).max(0.0).sqrt();
     let force = axis.motor.torque_constant / axis.transmission_ratio;
     let only = |constant| GravityCurrent { constant, ..GravityCurrent::default() };
-    let mut collinear = Vec::new();
-    for j in 0..6 {
-        for k in 0..j {
-            let rho = covariance[(j, k)] / (error(j) * error(k));
-            if rho.abs() > COLLINEAR {
-                collinear.push((NAMES[k], NAMES[j], rho));
-            }
-        }
-    }
     PlantRegression {
         inertia: InertiaFit {
             value: x[0] * per_current,
@@ -499,7 +735,8 @@ fn result(
             at_rest: gravity_at_rest(&data.still, law.i0 + INTERVAL * i0_error),
         },
         r_squared,
-        ripple: has_ripple.then(|| (x[RIPPLE], error(RIPPLE))),
+        logging: None,
+        cycle: 0,
         collinear,
     }
 }

@@ -6,16 +6,16 @@
 //! 3. Inertia, friction and gravity again, with the ripple that the closed loop causes in the current.
 //! 4. Checks: results that are worse than a constant lag, or implausibly far from the machine file, are invalid.
 
-use super::closed_loop::simulate;
+use super::closed_loop::CurrentHistory;
 use super::delays::{DelayFit, DelayParameter};
-use super::experiment::Experiment;
+use super::experiment::CurrentLogging;
 use super::feedforward_mode::FeedforwardMode;
 use super::gravity::GravityCurrent;
 use super::identification::Identification;
 use super::loop_fit::{LoopFit, LoopProblem};
 use super::loop_parameter::{LoopParameter, PRIOR};
 use super::options::{IdentificationInput, RefinementScope};
-use super::plant_regression::{CurrentRipple, PlantRegression, fit_plant};
+use super::plant_regression::{CurrentLoggings, CurrentRipple, LoggedInstant, PlantRegression, fit_plant};
 use super::recorded_feedforward::{fit_recorded_feedforward, recorded_feedforward};
 use super::refine::{RefinedParameter, RefinedValue, Refinement};
 use super::resample::interpolation_error;
@@ -39,6 +39,15 @@ const GAIN_CHANGE: f64 = 0.15;
 const CLEAR: f64 = 1.5;
 /// Ratio of two residuals that explain a motion alike.
 const ALIKE: f64 = 1.1;
+/// Largest number of instants of a position cycle that are compared; probability of the first one, and of the others together.
+const PHASES: usize = 48;
+const AT_SAMPLE: f64 = 1.0 / 3.0;
+const AT_OTHERS: f64 = 1.0 / 3.0;
+/// Velocity cycles by which β is moved, within its uncertainty.
+const BETA_SHIFTS: [i64; 5] = [-2, -1, 0, 1, 2];
+/// Bounds of the relative standard error of a simulated ripple, which is that of the bandwidth of the velocity loop.
+const LEAST_RIPPLE_ERROR: f64 = 0.05;
+const LARGEST_RIPPLE_ERROR: f64 = 0.5;
 /// Number of times that the plant is identified with the ripple of the loop.
 const PLANT_PASSES: usize = 2;
 /// Longest duration of motion of a recording that is simulated for delays and gains, s; all of it is compared at the end.
@@ -158,13 +167,24 @@ fn identify_loop(
         return;
     };
     let before = found.axis.clone();
-    for _ in 0..if has_plant { PLANT_PASSES } else { 0 } {
+    for pass in 0..if has_plant { PLANT_PASSES } else { 0 } {
         found.axis = fit.axis.clone();
-        let ripple = simulated_ripple(&recordings, &fit);
+        let loggings = possible_loggings(&recordings, &fit);
         let signals: Vec<&Signals> = recordings.iter().map(|(signals, _)| *signals).collect();
-        let Some(plant) = fit_plant(&signals, &found.axis, Some(&ripple)) else { break };
+        let Some(plant) = fit_plant(&signals, &found.axis, Some(&loggings)) else { break };
+        if let Some(other) =
+            plant.cycle.checked_sub(1).filter(|_| pass == 0).and_then(|k| fit.alternatives.get(k))
+        {
+            // The current shows another position cycle than the positions.
+            let cycle = LoopProblem { longest_cycle: (seconds(other.1.position), true), ..problem };
+            let Some(other) = lag.and_then(|lag| cycle.fit(&before, periods, lag)) else { break };
+            let cycles = fit.alternatives.into_iter().chain([(fit.axis, fit.periods)]);
+            let alternatives = cycles.filter(|(_, known)| *known != other.periods).collect();
+            fit = LoopFit { alternatives, ..other };
+            continue;
+        }
         apply_plant(&plant, found);
-        found.current_ripple = plant.ripple;
+        found.current_logging = plant.logging;
         // The velocity loop keeps its bandwidth.
         fit.axis = found.axis.clone();
         match problem.renew(&fit.axis, &fit) {
@@ -179,23 +199,73 @@ fn identify_loop(
     report_interpolation(inputs, seconds(fit.periods.position), found);
 }
 
-/// Returns the ripple of the current at the samples: the simulated current of an instant minus the mean over a
-/// position cycle.
-fn simulated_ripple(recordings: &[(&Signals, FeedforwardMode)], fit: &LoopFit) -> CurrentRipple {
-    let of = |(k, (signals, mode)): (usize, &(&Signals, FeedforwardMode))| {
-        let mut ripple: Vec<Vec<f64>> =
-            signals.spans.iter().map(|span| vec![f64::NAN; span.position.len()]).collect();
-        for instant in trace_experiments(signals, k, &fit.periods, (*mode, 0.0, 1.0)) {
-            let mean = Experiment { ripple: 0.0, ..instant.clone() };
-            let simulated = [&instant, &mean].map(|experiment| simulate(&fit.axis, &fit.periods, experiment));
-            let [Ok(at), Ok(mean)] = simulated else { continue };
-            let difference = at.current.iter().zip(&mean.current).map(|(a, m)| a - m);
-            let to = ripple[instant.span].iter_mut().skip(instant.sample);
-            to.zip(difference).for_each(|(to, value)| *to = value);
-        }
-        ripple
+/// Returns the ways in which the control can log the current: a mean over a position cycle, or an instant, most probably
+/// that of the sample. The position cycles are those that the positions permit.
+fn possible_loggings(recordings: &[(&Signals, FeedforwardMode)], fit: &LoopFit) -> CurrentLoggings {
+    let others = fit.alternatives.iter().map(|(axis, periods)| (axis, periods));
+    let cycles: Vec<(&AxisConfig, &Periods)> =
+        std::iter::once((&fit.axis, &fit.periods)).chain(others).collect();
+    let of = |parameter: LoopParameter| fit.values.iter().find(|value| value.parameter == parameter);
+    // The velocity feedforward steps once β has passed, within a position cycle.
+    let tsv = seconds(fit.periods.velocity);
+    let uncertain = of(LoopParameter::Beta).map_or(0.0, |beta| beta.error.hypot(tsv));
+    let shifts: &[i64] = if uncertain > 0.0 { &BETA_SHIFTS } else { &[0] };
+    let probability = |shift: i64| match shift {
+        0 => 1.0,
+        _ => (-0.5 * (shift as f64 * tsv / uncertain).powi(2)).exp(),
     };
-    recordings.iter().enumerate().map(of).collect()
+    let all: f64 = shifts.iter().map(|shift| probability(*shift)).sum();
+    let mut instants = Vec::new();
+    for (cycle, (axis, periods)) in cycles.iter().enumerate() {
+        for shift in shifts {
+            let mut shifted = (*axis).clone();
+            shifted.delays.beta = (shifted.delays.beta + shift * periods.velocity).max(0);
+            let ripples = simulated_ripples(recordings, (&shifted, periods));
+            let later = ripples.len().saturating_sub(1).max(1) as f64;
+            for (offset, ripple) in ripples {
+                let share = if offset == 0.0 { AT_SAMPLE } else { AT_OTHERS / later };
+                let prior = share * probability(*shift) / (all * cycles.len() as f64);
+                let (inertia, is_identified) = (axis.motor.inertia, *shift == 0);
+                instants.push(LoggedInstant { offset, cycle, prior, is_identified, ripple, inertia });
+            }
+        }
+    }
+    let error = of(LoopParameter::Bandwidth)
+        .map_or(LARGEST_RIPPLE_ERROR, |bandwidth| bandwidth.error / bandwidth.value);
+    // A logger that delays the actual values by a part of a cycle leaves their phase unknown.
+    let is_phase_known = !fit.is_between_cycles();
+    CurrentLoggings { instants, error: error.clamp(LEAST_RIPPLE_ERROR, LARGEST_RIPPLE_ERROR), is_phase_known }
+}
+
+/// Returns the ripple of the current at the samples for each instant at which it can be logged, with its time behind the
+/// sample, s: the simulated current of that instant minus the mean over a position cycle around the sample.
+fn simulated_ripples(
+    recordings: &[(&Signals, FeedforwardMode)],
+    (axis, periods): (&AxisConfig, &Periods),
+) -> Vec<(f64, CurrentRipple)> {
+    let tsp = seconds(periods.position);
+    // Samples within position cycles have their own renewal.
+    let renewal = recordings.iter().map(|(signals, _)| signals.period).fold(tsp, f64::min);
+    let unknown = |(signals, _): &(&Signals, FeedforwardMode)| -> Vec<Vec<f64>> {
+        signals.spans.iter().map(|span| vec![f64::NAN; span.position.len()]).collect()
+    };
+    let phases = ((renewal / seconds(periods.current)).round() as usize).clamp(1, PHASES);
+    let mut found: Vec<(f64, CurrentRipple)> = (0..phases)
+        .map(|k| (k as f64 / phases as f64 * renewal, recordings.iter().map(unknown).collect()))
+        .collect();
+    for (k, (signals, mode)) in recordings.iter().enumerate() {
+        for experiment in trace_experiments(signals, k, periods, (*mode, 0.0, CurrentLogging::MEAN)) {
+            let Ok(history) = CurrentHistory::new(axis, periods, &experiment) else { continue };
+            let mean = history.logged(&experiment, CurrentLogging::MEAN);
+            for (offset, ripple) in &mut found {
+                let logging = CurrentLogging { offset: *offset, ..CurrentLogging::INSTANT };
+                let at = history.logged(&experiment, logging);
+                let to = ripple[k][experiment.span].iter_mut().skip(experiment.sample);
+                to.zip(at.iter().zip(&mean)).for_each(|(to, (at, mean))| *to = at - mean);
+            }
+        }
+    }
+    found
 }
 
 /// Returns true if setpoints of position cycles of `tsp` s are interpolated between the samples of PSEC.
@@ -376,16 +446,16 @@ fn report_ripple(inputs: &[IdentificationInput<'_>], periods: &Periods, found: &
         return;
     }
     let is_at_one_phase = inputs.iter().any(|input| stride(tsp, input.signals.period).is_some());
-    let Some((share, error)) = found.current_ripple.filter(|_| is_at_one_phase) else { return };
-    // Signals have no negative part of a ripple.
-    let percent = |x: f64| 100.0 * x.clamp(0.0, 1.0);
+    let Some(logging) = found.current_logging.filter(|_| is_at_one_phase) else { return };
+    let what = match logging {
+        CurrentLogging::MEAN => "the mean over a position cycle".to_owned(),
+        _ => format!("the current {:.1} ms behind the sample", logging.offset / MILLISECOND),
+    };
     found.findings.push(Finding::note(
         "current-ripple",
         format!(
-            "the current contains {:.0} to {:.0} % of the ripple that the setpoints of the position cycles cause at their \
-             beginning (100 %: current of that instant, 0 %: mean over a cycle); the standard error of the inertia includes it",
-            percent(share - INTERVAL * error),
-            percent(share + INTERVAL * error)
+            "the setpoints of the position cycles cause a ripple of the current, and {what} explains the recorded one best; the \
+             standard error of the inertia includes other instants that explain it alike"
         ),
     ));
 }

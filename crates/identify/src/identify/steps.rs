@@ -120,7 +120,7 @@ impl<'a> IdentificationSteps<'a> {
                 periods: None,
                 active_feedforward: Vec::new(),
                 torque_constant,
-                current_ripple: None,
+                current_logging: None,
                 findings,
             },
         }
@@ -131,7 +131,7 @@ impl<'a> IdentificationSteps<'a> {
         let (inputs, periods) = (self.inputs, self.periods);
         if !takes_steps(inputs, &self.segments, &self.found.axis, periods) {
             identify_production(inputs, periods, self.options.refine, &mut self.found);
-            if self.found.current_ripple.is_none() {
+            if self.found.current_logging.is_none() {
                 let cycle = self.found.periods.unwrap_or(*periods);
                 report_aliased_current(inputs, &cycle, &mut self.found.findings);
             }
@@ -288,11 +288,11 @@ impl<'a> IdentificationSteps<'a> {
     /// Prepares the comparison of the identified axis with production traces.
     fn find_production_experiments(&mut self) {
         let periods = self.found.periods.unwrap_or(*self.periods);
-        let ripple = self.found.ripple();
+        let logging = self.found.current_logging();
         let of = |(k, input): (usize, &IdentificationInput<'_>)| {
             let active = self.found.active_feedforward.get(k).copied();
             let mode = active.or(input.feedforward).unwrap_or(FeedforwardMode::Both);
-            trace_experiments(input.signals, k, &periods, (mode, 0.0, ripple))
+            trace_experiments(input.signals, k, &periods, (mode, 0.0, logging))
         };
         self.experiments = self.inputs.iter().enumerate().flat_map(of).collect();
     }

@@ -1,6 +1,6 @@
 //! Experiments from recordings of any program at any sampling period.
 
-use super::experiment::Experiment;
+use super::experiment::{CurrentLogging, Experiment};
 use super::feedforward_mode::FeedforwardMode;
 use super::resample::BandLimitedSpline;
 use super::setpoints::{HELD, SetpointGrid};
@@ -21,8 +21,8 @@ const ENDING: usize = 6;
 const SHORTEST: f64 = 1.0;
 
 /// Returns the spans of a recording as experiments with PSEC at the position cycles, `shift` s later than recorded: the
-/// setpoints themselves, if the recording shows each of them, otherwise interpolated. `ripple` is the share of the ripple of
-/// the position cycle in the recorded current.
+/// setpoints themselves, if the recording shows each of them, otherwise interpolated. `logging` is that of the
+/// recorded current.
 ///
 /// A span can begin in motion, after a gap for instance: the simulation accelerates from rest to its first velocity, and
 /// the samples until it has settled are left out.
@@ -30,7 +30,7 @@ pub(super) fn trace_experiments(
     signals: &Signals,
     recording: usize,
     periods: &Periods,
-    (mode, shift, ripple): (FeedforwardMode, f64, f64),
+    (mode, shift, logging): (FeedforwardMode, f64, CurrentLogging),
 ) -> Vec<Experiment> {
     let (tsp, period) = (seconds(periods.position), signals.period);
     let skipped = (SETTLING / period).ceil() as usize;
@@ -67,7 +67,7 @@ pub(super) fn trace_experiments(
             first: before - origin + skipped as f64 * period,
             period,
             trace_filter: signals.trace_filter,
-            ripple,
+            logging,
             start: span.start + skipped as f64 * period,
             position: of(&span.position),
             velocity: of(span.recorded_velocity.as_ref().unwrap_or(&span.velocity)),

@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use super::closed_loop::{find_experiments, simulate_all};
-use super::experiment::{Experiment, SimulatedExperiment};
+use super::experiment::{CurrentLogging, Experiment, SimulatedExperiment};
 use super::feedforward_mode::FeedforwardMode;
 use super::fit::r_squared;
 use super::friction::friction_current;
@@ -111,12 +111,11 @@ pub fn validate(
     validate_with(input, (axis, periods), None)
 }
 
-/// Validates as [`validate`]; `joint` is the share of the ripple of the position cycle in the recorded current, if the axis
-/// was identified by the joint fit, whose recordings can begin in motion.
+/// Validates as [`validate`]; `joint` is the logging of the recorded current, if the axis was identified by the joint fit, whose recordings can begin in motion.
 pub(super) fn validate_with(
     input: &IdentificationInput<'_>,
     (axis, periods): (&AxisConfig, &Periods),
-    joint: Option<f64>,
+    joint: Option<CurrentLogging>,
 ) -> Result<Agreement, MachineError> {
     let mode = input.feedforward.unwrap_or(FeedforwardMode::Both);
     let on_grid = stride(input.signals.period, seconds(periods.position)).is_some();
@@ -126,8 +125,9 @@ pub(super) fn validate_with(
     };
     if experiments.is_empty() {
         let is_instant = input.signals.period <= seconds(periods.position);
-        let ripple = joint.unwrap_or(f64::from(u8::from(is_instant)));
-        experiments = trace_experiments(input.signals, 0, periods, (mode, 0.0, ripple));
+        let usual = if is_instant { CurrentLogging::INSTANT } else { CurrentLogging::MEAN };
+        let logging = joint.unwrap_or(usual);
+        experiments = trace_experiments(input.signals, 0, periods, (mode, 0.0, logging));
     }
     let signals = (input.signals, joint.is_some() || !on_grid);
     compute_agreement(signals, find_segments(input.signals), experiments, axis, periods)

@@ -72,10 +72,9 @@ fn residual(found: &AxisIdentification) -> f64 {
 fn the_result_does_not_depend_on_rate_and_sampling_of_the_current() {
     let (axis, seed) = hidden(AxisOrientation::Vertical);
     let program = axis.program(1, 12.0).expect("a program");
-    let instant = CurrentSampling::Instant(0.0);
-    for (milliseconds, sampling) in
-        [(2, instant), (4, instant), (10, instant), (2, CurrentSampling::Mean), (20, CurrentSampling::Mean)]
-    {
+    let (first, later) = (CurrentSampling::Instant(0.0), CurrentSampling::Instant(0.65));
+    let mean = CurrentSampling::Mean;
+    for (milliseconds, sampling) in [(2, first), (4, first), (10, first), (2, later), (2, mean), (20, mean)] {
         let raw = axis.record(&program, &recorder(milliseconds * MILLISECOND_NS, sampling), seed);
         let found = identified(&axis, seed, &raw.expect("a recording"));
         let [inertia, weight] = plant(&axis, seed, &found);
