@@ -134,8 +134,8 @@ background set_up
 stage "part programs" tools/part_programs.py || finish 1
 stage "dependencies" tools/dependencies.py || finish 1
 if [ $mode = all ]; then
-  # As the documentation installs it. Before the workspace, whose features differ: both put the program in the same place.
-  stage "command alone" cargo install --quiet --locked --path . --no-default-features --features cli \
+  # As README.md installs it; test_py/test_documentation.py installs it as docs/tutorials/first-run.md does.
+  stage "command alone" cargo install --quiet --locked --path . --no-default-features --features cli --profile quick \
     --root .build/command || finish 1
 fi
 stage "cargo build" cargo build --release --workspace --locked || finish 1
