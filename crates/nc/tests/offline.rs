@@ -9,7 +9,8 @@ use virtual_axes_builtin::PROGRAMS;
 use virtual_axes_core::config::{MachineConfig, Parameters};
 use virtual_axes_core::trial::{self, Figures, GridRows, GridSource, Measures, SetpointSource, Trial};
 use virtual_axes_nc::offline::{
-    Cause, CycleError, LineErrors, PartProgramOptions, PartProgramSource, ProgramFigures, ProgramTrack,
+    Cause, CycleError, LineErrors, OperationMeter, PartProgramOptions, PartProgramSource, ProgramFigures,
+    ProgramTrack,
 };
 
 /// Approach and retract at rapid traverse around a cut with a corner.
@@ -260,11 +261,12 @@ fn times_and_energy_by_operation_and_tool_add_up_to_those_of_the_program() {
     );
 }
 
-/// Without energy in the figures there is none by operation, and the times are the same.
+/// Without energy in the figures there is none by operation, and the times are the same, as are those of the setpoints
+/// without a simulation.
 #[test]
 fn times_do_not_need_energy() {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("times.nc");
-    fs::write(&path, POCKET).unwrap();
+    fs::write(&path, POCKET.replacen("G1", "(Slot)\nT2 M6\nG4 P0.3\nG1", 1)).unwrap();
     let (machine, name) = (machine(), path.to_str().unwrap());
     let times = |measures| {
         let (track, options) = (RefCell::new(ProgramTrack::default()), PartProgramOptions::default());
@@ -281,6 +283,18 @@ fn times_do_not_need_energy() {
     let (with, without) = (times(Measures::ALL), times(Measures::WITHOUT_CIRCLES));
     assert!(with.tools[0].energy.is_some() && without.tools[0].energy.is_none());
     assert!(without.energy_lines.is_empty() && with.times == without.times);
+
+    let (track, options) = (RefCell::new(ProgramTrack::default()), PartProgramOptions::default());
+    let mut source = PartProgramSource::open(name, PROGRAMS, &machine, &options, &track).unwrap();
+    let (mut meter, mut row) = (OperationMeter::new(&machine), vec![0.0; machine.axes().len()]);
+    while source.next(&mut row).unwrap() {
+        let (_, activity) = track.borrow_mut().setpoints.pop_front().unwrap();
+        meter.add_time(&track.borrow().comments, activity);
+    }
+    let planned = meter.finish(&track.borrow().comments);
+    assert!(planned.operations.len() > 1);
+    assert_eq!((planned.operations, planned.tools), (without.operations, without.tools));
+    assert!((planned.times.dwell - 0.3).abs() < 0.0061 && planned.times == without.times);
 }
 
 /// Returns the errors of `text` against the path of `reference`.

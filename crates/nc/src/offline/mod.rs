@@ -9,7 +9,7 @@ mod worst_lines;
 
 pub use corners::BoundedCorners;
 pub use operations::{
-    LineEnergy, OperationFigures, OperationSummary, ProgramEnergy, ProgramTimes, ToolFigures,
+    LineEnergy, OperationFigures, OperationMeter, OperationSummary, ProgramEnergy, ProgramTimes, ToolFigures,
 };
 pub use setpoints::{OverrideSchedule, PartProgramOptions, PartProgramSource, ProgramTrack};
 pub use survey::ProgramSurvey;

@@ -125,7 +125,7 @@ pub struct OperationSummary {
 
 /// Accumulator of times and energy by operation, tool and line.
 #[derive(Debug)]
-pub(super) struct OperationMeter {
+pub struct OperationMeter {
     /// Position period, s.
     period: f64,
     /// Sums by number of comments before the line and tool, in order of the first setpoint.
@@ -143,6 +143,7 @@ pub(super) struct OperationMeter {
 }
 
 impl OperationMeter {
+    /// Creates an accumulator for the position cycles of a machine.
     pub fn new(machine: &MachineConfig) -> Self {
         let periods = machine.periods();
         let delay = machine.axes().iter().map(|axis| axis.delays.alpha).max().unwrap_or(0);
@@ -158,29 +159,35 @@ impl OperationMeter {
         }
     }
 
+    /// Adds the time of a position cycle with the activity at its setpoint; `comments` are those of the program.
+    pub fn add_time(&mut self, comments: &[(usize, String)], activity: ProgramActivity) {
+        let ProgramActivity { kind, line, tool } = activity;
+        let key = (comments.partition_point(|(start, _)| *start <= line), tool);
+        let is_first = self.operations.is_empty();
+        if self.operations.get(self.last).is_none_or(|(last, _)| *last != key) {
+            let known = self.operations.iter().position(|(other, _)| *other == key);
+            self.last = known.unwrap_or_else(|| {
+                self.operations.push((key, Sums::default()));
+                self.operations.len() - 1
+            });
+        }
+        // The program takes the time from the first setpoint to the last.
+        if !is_first {
+            self.operations[self.last].1.cycles[kind as usize] += 1;
+        }
+    }
+
     /// Adds a position cycle: the activity at its setpoint, `None` behind the last one, and the energy of the axes while
     /// they execute the setpoint that is older by the delay of the position controllers.
-    pub fn add(
+    pub(super) fn add(
         &mut self,
         comments: &[(usize, String)],
         activity: Option<ProgramActivity>,
         machine: &Machine,
     ) {
-        if let Some(ProgramActivity { kind, line, tool }) = activity {
-            let key = (comments.partition_point(|(start, _)| *start <= line), tool);
-            let is_first = self.operations.is_empty();
-            if self.operations.get(self.last).is_none_or(|(last, _)| *last != key) {
-                let known = self.operations.iter().position(|(other, _)| *other == key);
-                self.last = known.unwrap_or_else(|| {
-                    self.operations.push((key, Sums::default()));
-                    self.operations.len() - 1
-                });
-            }
-            // The program takes the time from the first setpoint to the last.
-            if !is_first {
-                self.operations[self.last].1.cycles[kind as usize] += 1;
-            }
-            self.delayed.push_back((self.last, line));
+        if let Some(activity) = activity {
+            self.add_time(comments, activity);
+            self.delayed.push_back((self.last, activity.line));
         }
         // Behind the last setpoint the controllers still execute those before.
         let waiting =

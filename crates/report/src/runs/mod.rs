@@ -11,5 +11,5 @@ mod program_report;
 mod simulated_run;
 
 pub use page::SimulationPage;
-pub use program_report::ProgramReport;
+pub use program_report::{ProgramReport, operations_table, time_shares, tools_table};
 pub use simulated_run::{SimulatedRun, controller_name};

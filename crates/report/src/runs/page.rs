@@ -6,7 +6,7 @@ use virtual_axes_core::assess::SignalRecording;
 use virtual_axes_core::config::{AxisConfig, AxisKind, GpcConfig, PositionControllerConfig};
 use virtual_axes_core::units::{MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, seconds};
 
-use super::{SimulatedRun, comparison, table, verdict};
+use super::{SimulatedRun, comparison, operations_table, table, time_shares, tools_table, verdict};
 use crate::text::capital;
 use crate::{Report, ReportRun, Section, Table};
 
@@ -75,7 +75,9 @@ impl SimulationPage<'_> {
             let Some(program) = &run.part_program else { continue };
             let of_run = if self.runs.len() > 1 { format!("{}: ", run.title()) } else { String::new() };
             section.paragraphs.push(capital(&format!("{of_run}{}.", program.times())));
-            section.paragraphs.push(capital(&format!("{of_run}{}.", program.time_shares())));
+            section
+                .paragraphs
+                .push(capital(&format!("{of_run}{}.", time_shares(&program.figures.operations))));
             section.tables.push(
                 program.page_table(capital(&format!("{of_run}lines with the largest contour errors")), index),
             );
@@ -90,8 +92,11 @@ impl SimulationPage<'_> {
             let Some(program) = &run.part_program else { continue };
             let of_run = if self.runs.len() > 1 { format!("{}: ", run.title()) } else { String::new() };
             let parts = [
-                ("times by operation", program.operations_table(usize::MAX, str::to_owned)),
-                ("times by tool", program.tools_table()),
+                (
+                    "times by operation",
+                    operations_table(&program.figures.operations, usize::MAX, str::to_owned),
+                ),
+                ("times by tool", tools_table(&program.figures.operations)),
                 ("lines with the largest electrical input", program.energy_table(str::to_owned)),
             ];
             let captioned = parts

@@ -1,7 +1,7 @@
 //! Times, worst lines and path of a part program.
 
 use virtual_axes_core::units::{MICROMETER, MILLIDEGREE};
-use virtual_axes_nc::offline::{ProgramEnergy, ProgramFigures, ProgramTimes, WorstLine};
+use virtual_axes_nc::offline::{OperationSummary, ProgramEnergy, ProgramFigures, ProgramTimes, WorstLine};
 
 use crate::{Table, TableColumn, ToolPath};
 
@@ -29,6 +29,56 @@ fn tool_name(tool: Option<u32>) -> String {
     tool.map_or("–".to_owned(), |tool| format!("T{tool}"))
 }
 
+/// Returns the times by kind of motion as one line.
+pub fn time_shares(operations: &OperationSummary) -> String {
+    let ProgramTimes { feed, rapid, dwell, auxiliary } = operations.times;
+    format!(
+        "feed {feed:.2} s, rapid traverse {rapid:.2} s, dwell {dwell:.2} s, auxiliary (tool changes, spindle) \
+         {auxiliary:.2} s"
+    )
+}
+
+/// Returns a table of the operations, of which the `most` longest; without rows if there is only one. `escape` is applied
+/// to the texts.
+pub fn operations_table(summary: &OperationSummary, most: usize, escape: impl Fn(&str) -> String) -> Table {
+    let operations = &summary.operations;
+    let mut times: Vec<f64> = operations.iter().map(|one| one.times.total()).collect();
+    times.sort_by(|a, b| b.total_cmp(a));
+    let least = times.get(most.saturating_sub(1)).copied().unwrap_or(0.0);
+    let columns = [("line", ""), ("operation", ""), ("tool", "")];
+    let mut table = Table::new("", &[&columns[..], &TIMES].concat());
+    for one in operations.iter().filter(|one| operations.len() > 1 && one.times.total() >= least) {
+        let text = if one.text.is_empty() { "start".to_owned() } else { escape(&one.text) };
+        let row = [one.line.to_string(), text, tool_name(one.tool)].into_iter();
+        table.rows.push(row.chain(part(&one.times, one.energy)).collect());
+    }
+    table.rows.truncate(most);
+    if operations.iter().all(|one| one.energy.is_none()) {
+        remove_energy(&mut table);
+    }
+    table
+}
+
+/// Returns a table of the tools; without rows if there is only one.
+pub fn tools_table(summary: &OperationSummary) -> Table {
+    let tools = &summary.tools;
+    let mut table = Table::new("", &[&[("tool", "")][..], &TIMES].concat());
+    for one in tools.iter().filter(|_| tools.len() > 1) {
+        let row = std::iter::once(tool_name(one.tool)).chain(part(&one.times, one.energy));
+        table.rows.push(row.collect());
+    }
+    if tools.iter().all(|one| one.energy.is_none()) {
+        remove_energy(&mut table);
+    }
+    table
+}
+
+/// Removes the last column, the energy.
+fn remove_energy(table: &mut Table) {
+    table.columns.pop();
+    table.rows.iter_mut().for_each(|row| row.truncate(table.columns.len()));
+}
+
 /// Figures of a part program, and its path.
 #[derive(Debug, Clone)]
 pub struct ProgramReport {
@@ -51,44 +101,6 @@ impl ProgramReport {
             "cycle time {:.2} s; motions at programmed feed alone {:.2} s",
             self.figures.cycle_time, self.figures.programmed_time
         )
-    }
-
-    /// Returns the times by kind of motion as one line.
-    pub fn time_shares(&self) -> String {
-        let ProgramTimes { feed, rapid, dwell, auxiliary } = self.figures.operations.times;
-        format!(
-            "feed {feed:.2} s, rapid traverse {rapid:.2} s, dwell {dwell:.2} s, auxiliary (tool changes, spindle) \
-             {auxiliary:.2} s"
-        )
-    }
-
-    /// Returns a table of the operations, of which the `most` longest; without rows if there is only one. `escape` is applied
-    /// to the texts.
-    pub fn operations_table(&self, most: usize, escape: impl Fn(&str) -> String) -> Table {
-        let operations = &self.figures.operations.operations;
-        let mut times: Vec<f64> = operations.iter().map(|one| one.times.total()).collect();
-        times.sort_by(|a, b| b.total_cmp(a));
-        let least = times.get(most.saturating_sub(1)).copied().unwrap_or(0.0);
-        let columns = [("line", ""), ("operation", ""), ("tool", "")];
-        let mut table = Table::new("", &[&columns[..], &TIMES].concat());
-        for one in operations.iter().filter(|one| operations.len() > 1 && one.times.total() >= least) {
-            let text = if one.text.is_empty() { "start".to_owned() } else { escape(&one.text) };
-            let row = [one.line.to_string(), text, tool_name(one.tool)].into_iter();
-            table.rows.push(row.chain(part(&one.times, one.energy)).collect());
-        }
-        table.rows.truncate(most);
-        table
-    }
-
-    /// Returns a table of the tools; without rows if there is only one.
-    pub fn tools_table(&self) -> Table {
-        let tools = &self.figures.operations.tools;
-        let mut table = Table::new("", &[&[("tool", "")][..], &TIMES].concat());
-        for one in tools.iter().filter(|_| tools.len() > 1) {
-            let row = std::iter::once(tool_name(one.tool)).chain(part(&one.times, one.energy));
-            table.rows.push(row.collect());
-        }
-        table
     }
 
     /// Returns a table of the lines with the largest electrical input; `escape` is applied to their texts.

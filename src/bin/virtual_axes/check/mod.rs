@@ -19,18 +19,20 @@ use virtual_axes_core::trajectory::limits::TRAVEL_TOLERANCE;
 use virtual_axes_core::trial::{self, Measures, SetpointSource, Tick, Trial};
 use virtual_axes_core::units::Nanoseconds;
 use virtual_axes_io::files::FileKind;
+use virtual_axes_nc::offline::OperationMeter;
 
 use crate::arguments::log_arguments::LogArguments;
 use crate::builtin::{PROGRAMS, SCENARIOS};
 use crate::input::part_program::{self, PartProgramArguments};
 use crate::input::setpoint_summary::SetpointSummary;
 use crate::input::{CommandInput, program_text};
+use crate::output::operations::operations_text;
 use crate::output::progress::TrialProgress;
 use crate::output::{interrupt, print_error, text_table};
 use limit_audit_output::LimitExcess;
 use row_audit::RowAudit;
 use virtual_axes_report::limit_audit;
-use virtual_axes_report::runs::axis_warnings;
+use virtual_axes_report::runs::{axis_warnings, time_shares};
 
 /// Arguments of `virtual_axes check`.
 #[derive(Debug, clap::Args)]
@@ -205,7 +207,7 @@ fn part_program(
     let mut audit = LimitAudit::new(machine);
     let (mut row, mut psec) = (vec![0.0; joints.len()], vec![0.0; machine.axes().len()]);
     progress = TrialProgress::with_lines(name, lines, arguments.json);
-    let mut time = 0;
+    let (mut time, mut operations) = (0, OperationMeter::new(machine));
     while source.next(&mut row).map_err(|error| -> Box<dyn Error> { error })? {
         interrupt::check()?;
         progress.set_line(input.track().borrow().lines_read);
@@ -216,6 +218,9 @@ fn part_program(
         }
         // The first setpoint is the start, of line 0.
         let point = input.track().borrow_mut().setpoints.pop_front();
+        if let Some((_, activity)) = point {
+            operations.add_time(&input.track().borrow().comments, activity);
+        }
         let line = point.map(|point| point.0.line).filter(|line| *line > 0);
         audit.add(time, line, psec.iter().copied());
         time += machine.periods().position;
@@ -223,7 +228,11 @@ fn part_program(
     progress.finish();
     input.print_program_notes();
     let duration = input.track().borrow().cycle_time;
+    let operations = operations.finish(&input.track().borrow().comments);
     summary += &format!("cycle time {duration:.3} s\n");
+    summary += &text_table::wrapped_line(&time_shares(&operations));
+    let table = operations_text(&operations);
+    summary += &(table + if operations.operations.len() > 1 { "\n" } else { "" });
     AuditedInput { name, machine: machine.name(), duration, summary }.result(audit, arguments.json)
 }
 

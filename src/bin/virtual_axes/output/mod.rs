@@ -3,6 +3,7 @@
 pub mod emphasis;
 pub mod interrupt;
 pub mod machine_file;
+pub mod operations;
 pub mod progress;
 pub mod report;
 pub mod text_table;

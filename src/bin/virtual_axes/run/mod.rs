@@ -17,7 +17,9 @@ use virtual_axes_core::units::{Nanoseconds, seconds};
 use virtual_axes_io::files::{RowWriter, figures_json, part_program_json, trace_writer};
 use virtual_axes_nc::offline::{LineErrors, line_texts};
 use virtual_axes_report::ToolPath;
-use virtual_axes_report::runs::{ProgramReport, SimulatedRun, comparison, figure, table, verdict};
+use virtual_axes_report::runs::{
+    ProgramReport, SimulatedRun, comparison, figure, table, time_shares, verdict,
+};
 
 use crate::arguments::output_arguments::{OutputArguments, OutputFormat};
 use crate::arguments::trial_arguments::TrialArguments;
@@ -25,6 +27,7 @@ use crate::arguments::variant::{self, RunController};
 use crate::builtin::PROGRAMS;
 use crate::input::setpoint_summary::SetpointSummary;
 use crate::input::{CommandInput, program_text};
+use crate::output::operations::operations_text;
 use crate::output::report::{self, ReportMachine};
 use crate::output::{interrupt, text_table};
 use period::PeriodArgument;
@@ -253,20 +256,13 @@ fn single(run: &SimulatedRun) -> Vec<String> {
     std::iter::once(axes).chain(path).chain(energy).chain(program).collect()
 }
 
-/// Largest number of operations in the table; the JSON output contains all.
-const OPERATIONS: usize = 12;
-
 /// Returns the times of a part program, a table of its worst lines, and its operations and tools if there are several.
 fn part_program_text(program: &ProgramReport) -> String {
+    let operations = &program.figures.operations;
     let mut text = text_table::wrapped_line(&program.times());
-    text += &text_table::wrapped_line(&program.time_shares());
+    text += &text_table::wrapped_line(&time_shares(operations));
     text += &text_table::aligned(&program.worst_table(escaped), &[1, 2, 3]);
-    let parts =
-        [(program.operations_table(OPERATIONS, escaped), &[0, 1, 2][..]), (program.tools_table(), &[0][..])];
-    for (table, left) in parts.into_iter().filter(|(table, _)| !table.rows.is_empty()) {
-        text += &format!("\n{}", text_table::aligned(&table, left));
-    }
-    text
+    text + &operations_text(operations)
 }
 
 fn several(runs: &[SimulatedRun]) -> Vec<String> {
