@@ -266,7 +266,7 @@ fn times_and_energy_by_operation_and_tool_add_up_to_those_of_the_program() {
 #[test]
 fn times_do_not_need_energy() {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("times.nc");
-    fs::write(&path, POCKET.replacen("G1", "(Slot)\nT2 M6\nG4 P0.3\nG1", 1)).unwrap();
+    fs::write(&path, POCKET.replacen("G1 X20 Y30", "(Slot)\nT2 M6\nG4 P0.3\nG1 X20 Y30", 1)).unwrap();
     let (machine, name) = (machine(), path.to_str().unwrap());
     let times = |measures| {
         let (track, options) = (RefCell::new(ProgramTrack::default()), PartProgramOptions::default());
