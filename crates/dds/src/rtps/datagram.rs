@@ -38,8 +38,11 @@ pub(crate) struct ReaderAnnouncement {
     pub is_volatile: bool,
 }
 
+/// Identifiers and values of a parameter list.
+type Parameters<'a> = Vec<(u16, &'a [u8])>;
+
 /// Returns the parameters of a list, with the octets behind its sentinel, up to the first invalid one (9.4.2.11).
-fn parameters(octets: &[u8], is_little_endian: bool) -> (Vec<(u16, &[u8])>, &[u8]) {
+fn parameters(octets: &[u8], is_little_endian: bool) -> (Parameters<'_>, &[u8]) {
     let number = |octets: [u8; 2]| {
         if is_little_endian { u16::from_le_bytes(octets) } else { u16::from_be_bytes(octets) }
     };
@@ -108,7 +111,7 @@ impl Submessage {
 
     /// Returns the parameters of a DATA of the writer `writer` and whether their numbers are little-endian; `None` for other
     /// submessages and other content.
-    fn announced<'a>(&self, datagram: &'a [u8], writer: EntityId) -> Option<(Vec<(u16, &'a [u8])>, bool)> {
+    fn announced<'a>(&self, datagram: &'a [u8], writer: EntityId) -> Option<(Parameters<'a>, bool)> {
         let flags = datagram[self.start - 3];
         if self.kind != SUBMESSAGE_DATA || self.entity(datagram, 8)? != writer || flags & FLAG_DATA == 0 {
             return None;
