@@ -57,8 +57,6 @@ const RIPPLE: usize = 6;
 const RIPPLE_PRIOR: usize = 3;
 /// Longest distance of the samples of the regression, s: a tenth of the length of its filter.
 const THINNED: f64 = 2e-3;
-/// Probability from which on the current shows another position cycle.
-const CERTAIN: f64 = 0.95;
 /// Passes of a comparison, whose prior depends on the inertia.
 const LINEAR_PASSES: usize = 3;
 /// Noise of the current in the first pass and least noise in the second one, relative to the largest current.
@@ -75,11 +73,9 @@ pub(super) type CurrentRipple = Vec<Vec<Vec<f64>>>;
 pub(super) struct LoggedInstant {
     /// Time behind the sample, s.
     pub offset: f64,
-    /// Index of the position cycle among those that are compared, 0 for the identified one.
-    pub cycle: usize,
     /// Probability before the comparison.
     pub prior: f64,
-    /// True if β of the simulation is that of the axis: others widen the standard errors only.
+    /// True if position cycle and β of the simulation are those of the axis: others widen the standard errors only.
     pub is_identified: bool,
     /// Simulated current of the instant minus the mean over a position cycle.
     pub ripple: CurrentRipple,
@@ -111,8 +107,6 @@ pub(super) struct PlantRegression {
     pub r_squared: f64,
     /// Logging of the current; none if none was compared.
     pub logging: Option<CurrentLogging>,
-    /// Index of the position cycle of the logging among those that were compared.
-    pub cycle: usize,
     /// Pairs of collinear parameters with their correlation.
     pub collinear: Vec<(&'static str, &'static str, f64)>,
 }
@@ -411,7 +405,7 @@ fn fit_plant_by_regression(
     let measured = data.measured(recordings, axis);
     let mut fit = data.fit(&measured, None, has_gravity)?;
     let mut logging = loggings.map(|_| CurrentLogging::MEAN);
-    let (mut spread, mut cycle) = (None, 0);
+    let mut spread = None;
     if let Some(loggings) = loggings {
         let per_current = axis.motor.torque_constant * axis.transmission_ratio;
         let ripple_of = |instant| data.ripple_of(recordings, instant, per_current);
@@ -421,7 +415,6 @@ fn fit_plant_by_regression(
         if let Some(k) = compared.best {
             data.samples.iter_mut().zip(&columns[k]).for_each(|(sample, ripple)| sample.ripple = *ripple);
             fit = data.fit(&measured, Some(loggings.error), has_gravity)?;
-            cycle = loggings.instants[k].cycle;
             logging =
                 Some(CurrentLogging { ripple: fit.values[RIPPLE], offset: loggings.instants[k].offset });
         }
@@ -429,11 +422,7 @@ fn fit_plant_by_regression(
     let clusters: Vec<Option<usize>> = data.samples.iter().map(|sample| Some(sample.cluster)).collect();
     let residuals = |x: &[f64]| Some(data.residuals(x, &measured, (fit.noise, fit.ripple)));
     let covariance = posterior_covariance(&fit.parameters, &fit.values, residuals, &clusters, fit.noise)?;
-    Some(PlantRegression {
-        logging,
-        cycle,
-        ..result(&data, &measured, axis, &fit.values, (covariance, spread))
-    })
+    Some(PlantRegression { logging, ..result(&data, &measured, axis, &fit.values, (covariance, spread)) })
 }
 
 /// Fit of the current at the samples in motion.
@@ -629,19 +618,9 @@ impl MovingData {
             prior * (-0.5 * excess / (noise * noise)).exp()
         };
         let sum: f64 = compared.iter().map(weight).sum();
-        let cycle_of = |way: &Option<usize>| way.map(|k| loggings.instants[k].cycle);
-        let share = |cycle: usize| {
-            let of_it = compared.iter().filter(|(way, _, _)| cycle_of(way) == Some(cycle));
-            of_it.map(weight).sum::<f64>() / sum
-        };
-        // Another position cycle than the identified one must be certain.
-        let cycles = loggings.instants.iter().map(|instant| instant.cycle).max().unwrap_or(0);
-        let cycle = (1..=cycles).find(|cycle| share(*cycle) > CERTAIN).unwrap_or(0);
         let best = compared
             .iter()
-            .filter(|(way, _, _)| {
-                way.is_none_or(|k| loggings.instants[k].cycle == cycle && loggings.instants[k].is_identified)
-            })
+            .filter(|(way, _, _)| way.is_none_or(|k| loggings.instants[k].is_identified))
             .max_by(|a, b| weight(a).total_cmp(&weight(b)));
         let mut spread = DMatrix::zeros(x.len(), x.len());
         if let Some((_, center, _)) = best.filter(|_| sum > 0.0) {
@@ -736,7 +715,6 @@ fn result(
         },
         r_squared,
         logging: None,
-        cycle: 0,
         collinear,
     }
 }

@@ -167,22 +167,11 @@ fn identify_loop(
         return;
     };
     let before = found.axis.clone();
-    for pass in 0..if has_plant { PLANT_PASSES } else { 0 } {
+    for _ in 0..if has_plant { PLANT_PASSES } else { 0 } {
         found.axis = fit.axis.clone();
         let loggings = possible_loggings(&recordings, &fit);
         let signals: Vec<&Signals> = recordings.iter().map(|(signals, _)| *signals).collect();
         let Some(plant) = fit_plant(&signals, &found.axis, Some(&loggings)) else { break };
-        if let Some(other) =
-            plant.cycle.checked_sub(1).filter(|_| pass == 0).and_then(|k| fit.alternatives.get(k))
-        {
-            // The current shows another position cycle than the positions.
-            let cycle = LoopProblem { longest_cycle: (seconds(other.1.position), true), ..problem };
-            let Some(other) = lag.and_then(|lag| cycle.fit(&before, periods, lag)) else { break };
-            let cycles = fit.alternatives.into_iter().chain([(fit.axis, fit.periods)]);
-            let alternatives = cycles.filter(|(_, known)| *known != other.periods).collect();
-            fit = LoopFit { alternatives, ..other };
-            continue;
-        }
         apply_plant(&plant, found);
         found.current_logging = plant.logging;
         // The velocity loop keeps its bandwidth.
@@ -225,8 +214,8 @@ fn possible_loggings(recordings: &[(&Signals, FeedforwardMode)], fit: &LoopFit) 
             for (offset, ripple) in ripples {
                 let share = if offset == 0.0 { AT_SAMPLE } else { AT_OTHERS / later };
                 let prior = share * probability(*shift) / (all * cycles.len() as f64);
-                let (inertia, is_identified) = (axis.motor.inertia, *shift == 0);
-                instants.push(LoggedInstant { offset, cycle, prior, is_identified, ripple, inertia });
+                let (inertia, is_identified) = (axis.motor.inertia, cycle == 0 && *shift == 0);
+                instants.push(LoggedInstant { offset, prior, is_identified, ripple, inertia });
             }
         }
     }
