@@ -152,7 +152,6 @@ PARTICIPANTS = 20_000
 SENDING_S = 10.0
 
 
-
 @pytest.mark.extended
 def test_forged_participants_do_not_stop_the_axes() -> None:
     """No position cycle is lost and services respond; a participant that joins afterwards is served."""
