@@ -64,7 +64,8 @@ const VERIFICATIONS: usize = 20;
 pub enum CompileAim {
     /// Contour errors up to a tolerance, m, in the least time.
     Tolerance(f64),
-    /// Least error with a cycle time of at most that of the program, times one plus this value.
+    /// Least error with a cycle time of at most that of the program, times one plus this value, or one position cycle more
+    /// than that of the program.
     Time(f64),
 }
 
@@ -167,8 +168,10 @@ pub fn compile(
     let before = simulator.run(&planned, planned.path(), plants.len())?;
     let longest = match options.aim {
         CompileAim::Tolerance(_) => f64::INFINITY,
-        // Setpoints lie on the grid of the position cycle.
-        CompileAim::Time(more) => before.time * (1.0 + more) + seconds(machine.periods().position),
+        // Setpoints lie on the grid of the position cycle: the same time may be one cycle later.
+        CompileAim::Time(more) => {
+            (before.time * (1.0 + more)).max(before.time + seconds(machine.periods().position))
+        }
     };
     let (mut best, mut left_out): (Option<(ProgramModel, Candidate)>, BTreeSet<usize>) =
         (None, BTreeSet::new());
