@@ -221,6 +221,10 @@ fn invalid_input_is_rejected_with_its_name() {
     let (empty, header) = (file("empty.csv", ""), file("header.csv", "time,x.position,x.current\n"));
     let scenario = file("scenario.yaml", &printed(&["scenarios", "--show", "ballbar"]));
     let map = file("map.yaml", "position: x.position[mm]\nvelocity: x.velocity[mm/s]\n");
+    // A motion of 1 m/s, in millimeters without a unit.
+    let rows = (0..2000).map(|i| format!("{},{i},{i}\n", f64::from(i) * 1e-3));
+    let millimeters =
+        file("millimeters.csv", &("time,x.position,x.psec\n".to_owned() + &rows.collect::<String>()));
     let names = folder.names();
     let of = |more: &[&str]| -> Vec<String> {
         let all = [&["identify", &recordings.off, "--axis", "x", "--feedforward", "off"], more].concat();
@@ -245,6 +249,10 @@ fn invalid_input_is_rejected_with_its_name() {
     );
     // Wrong units and columns.
     rejected(&["--column", "time=time[ms]"], &["off.csv: sampling period 6e-6 s", "time=COLUMN[s]"]);
+    assert_rejected(
+        &["identify", &millimeters, "--axis", "x"],
+        &["position=COLUMN[mm]", "without --axis, the command with all such units is printed"],
+    );
     rejected(
         &["--column", "position=x.position[deg]"],
         &["--column: the unit of position is [deg]", "linear axis x"],

@@ -8,6 +8,8 @@ use std::fmt;
 
 /// Meters in a millimeter.
 pub const MILLIMETER: f64 = 1e-3;
+/// Inch in m.
+pub const INCH: f64 = 25.4 * MILLIMETER;
 /// Meters in a micrometer.
 pub const MICROMETER: f64 = 1e-6;
 /// Seconds in a millisecond.

@@ -145,7 +145,10 @@ fn headers_name_channel_unit_and_axis() {
         ("velocity feedforward [rpm]", "velocity_feedforward [rpm]"),
         ("torque_ffw_Nm", "torque_feedforward [N.m]"),
         ("Drehzahlvorsteuerung", "velocity_feedforward [rad/s of the motor (assumed)]"),
-        ("Position [inch]", "position [unknown: inch]"),
+        ("Position [inch]", "position [in]"),
+        ("Y Actual (in)", "position [in] y"),
+        ("Velocity_actual_ipm", "velocity [in/min]"),
+        ("Position [ft]", "position [unknown: ft]"),
         ("x_cmd", "psec [m or rad (assumed)] x"),
         ("X Ist [mm]", "position [mm] x"),
         ("v [mm/s]", "velocity [mm/s]"),
@@ -298,23 +301,27 @@ fn the_list_says_why_a_torque_without_newton_meters_is_not_read() {
 }
 
 #[test]
-fn dates_are_no_times() {
-    let message = Recorded::new("dates", "Time,position\n2024-05-01 12:00:00.002,1\n").error("x");
-    assert!(message.contains("convert dates and times of day to seconds"), "{message}");
+fn dates_are_times_from_the_first_one() {
+    let text = "Time,position\n2024-05-01 23:59:59.998,1\n2024-05-02 00:00:00.002,2\n";
+    assert_eq!(Recorded::new("dates", text).good("x").time, [0.0, 0.004]);
+    let message = Recorded::new("dates", "Time,position\n5/1/2024 12:00:00 PM,1\n").error("x");
+    assert!(message.contains("write dates and times of day as 2024-02-29T13:45:00.002"), "{message}");
 }
 
 #[test]
 fn units_of_detected_columns_must_fit_the_axis() {
     assert_eq!(
         Recorded::new("unfit", "time,position [deg]\n0,1\n").error("x"),
-        "r:1: position from column position [deg] is in deg, must be in one of m, mm, um; give the unit by \
+        "r:1: position from column position [deg] is in deg, must be in one of m, mm, um, in; give the unit by \
          --column 'position=COLUMN[UNIT]', for example with a factor: [25.4 mm]"
     );
-    let message = Recorded::new("unfit", "time,position [inch]\n0,1\n").error("x");
-    assert!(message.contains("has the unknown unit inch, must be in one of m, mm, um"), "{message}");
-    let inch =
-        Recorded::new("unfit", "time,position [inch]\n0,1\n").columns(&["position=[25.4 mm]"]).good("x");
-    assert_eq!(inch.position, Some(vec![0.0254]));
+    let message = Recorded::new("unfit", "time,position [ft]\n0,1\n").error("x");
+    assert!(message.contains("has the unknown unit ft, must be in one of m, mm, um, in"), "{message}");
+    let foot =
+        Recorded::new("unfit", "time,position [ft]\n0,1\n").columns(&["position=[304.8 mm]"]).good("x");
+    assert_eq!(foot.position, Some(vec![0.3048]));
+    let inch = Recorded::new("inch", "time,position (in),velocity [in/min]\n0,10,60\n").good("x");
+    assert_eq!((inch.position, inch.velocity), (Some(vec![0.254]), Some(vec![0.0254])));
     let (found, findings) =
         Recorded::new("unfit", "time,position,speed [rpm]\n0,1,2\n").read("x").expect("good");
     assert_eq!(found.velocity, None);

@@ -169,7 +169,7 @@ fn an_error_of_a_unit_lists_the_allowed_units() {
         |axis, channel, unit| value(axis, channel, "1", unit).expect_err("does not fit").to_string();
     assert_eq!(
         message_of(x, "position", "[deg]"),
-        "--column: the unit of position is [deg], must be one of m, mm, um for the linear axis x"
+        "--column: the unit of position is [deg], must be one of m, mm, um, in for the linear axis x"
     );
     assert_eq!(
         message_of(a, "velocity", "[m/min]"),
@@ -189,7 +189,7 @@ fn an_error_of_a_unit_lists_the_allowed_units() {
     );
     assert_eq!(
         message_of(lx, "velocity_feedforward", "[rpm]"),
-        "--column: the unit of velocity_feedforward is [rpm], must be one of m/s, mm/s, m/min, mm/min for the linear axis x"
+        "--column: the unit of velocity_feedforward is [rpm], must be one of m/s, mm/s, m/min, mm/min, in/s, in/min for the linear axis x"
     );
     assert_eq!(
         message_of(a, "velocity_feedforward", "[deg/s]"),

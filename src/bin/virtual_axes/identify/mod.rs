@@ -131,6 +131,18 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     check_listing(arguments)?;
     check_outputs(arguments)?;
     let Some(axes) = &arguments.axis else { return listing(arguments) };
+    run_axes(arguments, axes).map_err(|error| {
+        match error.is::<InvalidResult>()
+            || !next_command::is_corrected(&error.to_string(), &arguments.reading)
+        {
+            true => error,
+            false => format!("{error}; without --axis, the command with all such units is printed").into(),
+        }
+    })
+}
+
+/// Identifies the axes that the option `--axis` names.
+fn run_axes(arguments: &IdentifyArguments, axes: &str) -> Result<String, Box<dyn Error>> {
     let Start { parameters, axes, others } = start(arguments, axes)?;
     let config = parameters.machine_config()?;
     let indices = axes.iter().map(|selected| axis::index(&config, &selected.name));

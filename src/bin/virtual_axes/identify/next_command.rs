@@ -180,12 +180,11 @@ impl Listed<'_> {
             if corrections > CORRECTIONS {
                 return Err(error);
             }
-            let channel = |column: &str| column.split('=').next().unwrap_or_default().to_owned();
             match correction(&error) {
                 Some(Correction::Unit(column))
-                    if !self.reading.maps(&channel(&column)) && !columns.contains(&column) =>
+                    if !self.reading.maps(channel_of(&column)) && !columns.contains(&column) =>
                 {
-                    columns.retain(|known| channel(known) != channel(&column));
+                    columns.retain(|known| channel_of(known) != channel_of(&column));
                     columns.push(column);
                 }
                 Some(Correction::Shift) if !is_shifted => is_shifted = true,
@@ -227,6 +226,16 @@ enum Correction {
     Unit(String),
     /// Setpoint that is moved forward.
     Shift,
+}
+
+/// Returns true if an error names the unit of a column without a mapping: the printed command has it.
+pub fn is_corrected(error: &str, reading: &RecordingArguments) -> bool {
+    matches!(correction(error), Some(Correction::Unit(column)) if !reading.maps(channel_of(&column)))
+}
+
+/// Returns the channel of a column mapping.
+fn channel_of(column: &str) -> &str {
+    column.split('=').next().unwrap_or_default()
 }
 
 /// Returns the option that an error names as its remedy.

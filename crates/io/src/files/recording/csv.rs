@@ -148,7 +148,10 @@ impl Layout {
             let Some((index, factor)) = *slot else { continue };
             match parse_number(field, self.decimal_comma) {
                 Some(value) if index > 0 || value.is_finite() => values[index] = factor * value,
-                _ => wrong = wrong.or(Some((column, index, field))),
+                _ => match self.timestamps.seconds(field).filter(|_| index == 0) {
+                    Some(value) => values[index] = value,
+                    None => wrong = wrong.or(Some((column, index, field))),
+                },
             }
         }
         let at = || format!("{name}:{line}");
@@ -165,7 +168,7 @@ impl Layout {
             let is_date = index == 0 && field.matches([':', '-', 'T']).count() > 1;
             let hint = match self.decimal_comma {
                 _ if is_date => {
-                    "; convert dates and times of day to seconds, or delete the column and give the sampling rate by --rate-hz"
+                    "; write dates and times of day as 2024-02-29T13:45:00.002, or delete the column and give the sampling rate by --rate-hz"
                 }
                 false if field.contains(',') && parse_number(field, true).is_some() => {
                     "; set --column decimal_comma=true for decimal commas"

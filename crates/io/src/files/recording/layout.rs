@@ -8,6 +8,7 @@ use super::context::Context;
 use super::format::Found;
 use super::found_column::FoundColumn;
 use super::header::detect_columns;
+use super::timestamp::TimestampReader;
 use super::unit::Channel;
 use crate::files::error::FileError;
 use crate::files::lines::{Lines, fields_between};
@@ -28,6 +29,8 @@ pub(super) struct Layout {
     pub found: Vec<FoundColumn>,
     /// Channels of the columns.
     pub assignment: ColumnAssignment,
+    /// TimestampReader of times of day.
+    pub timestamps: TimestampReader,
     /// True if the first line contains values instead of a header.
     pub is_data: bool,
 }
@@ -81,7 +84,15 @@ impl Context<'_> {
         if is_data {
             columns = (1..=columns.len()).map(|number| format!("#{number}")).collect();
         }
-        Ok(Layout { delimiter, decimal_comma, columns, found, assignment, is_data })
+        Ok(Layout {
+            delimiter,
+            decimal_comma,
+            columns,
+            found,
+            assignment,
+            timestamps: TimestampReader::default(),
+            is_data,
+        })
     }
 
     /// Returns a hint if the columns are not found in the first line.

@@ -21,6 +21,7 @@ mod series;
 mod sinumerik_edge;
 mod sinumerik_signal;
 mod sinumerik_trace;
+mod timestamp;
 mod trace_samples;
 mod twincat;
 mod twincat_header;

@@ -4,7 +4,7 @@ use std::fmt;
 
 use virtual_axes_core::config::{AxisConfig, AxisKind};
 use virtual_axes_core::text::shortened;
-use virtual_axes_core::units::{DEGREE, METER_PER_MINUTE, MILLIMETER, MILLISECOND, MINUTE, RPM};
+use virtual_axes_core::units::{DEGREE, INCH, METER_PER_MINUTE, MILLIMETER, MILLISECOND, MINUTE, RPM};
 
 virtual_axes_core::named_values! {
     /// Channels of a recording of an axis, as in [`RawRecording`](virtual_axes_identify::recording::RawRecording), with
@@ -44,10 +44,14 @@ impl Channel {
         match self {
             Channel::Time => &["s", "ms", "us", "ns"],
             Channel::Psec | Channel::Position | Channel::MotorPosition | Channel::WindUp => {
-                &["m", "mm", "um", "rad", "deg", "mdeg"]
+                &["m", "mm", "um", "in", "rad", "deg", "mdeg"]
             }
-            Channel::Velocity => &["m/s", "mm/s", "m/min", "mm/min", "rad/s", "deg/s", "deg/min", "rpm"],
-            Channel::VelocityFeedforward => &["rad/s", "rpm", "m/s", "mm/s", "m/min", "mm/min"],
+            Channel::Velocity => {
+                &["m/s", "mm/s", "m/min", "mm/min", "in/s", "in/min", "rad/s", "deg/s", "deg/min", "rpm"]
+            }
+            Channel::VelocityFeedforward => {
+                &["rad/s", "rpm", "m/s", "mm/s", "m/min", "mm/min", "in/s", "in/min"]
+            }
             Channel::Current => &["A", "mA", "N.m", "N"],
             Channel::Torque => &["N.m", "N"],
             Channel::TorqueFeedforward => &["N.m", "N", "A", "mA"],
@@ -88,7 +92,7 @@ impl Channel {
         match self {
             Channel::Time => vec![("s", 1.0), ("ms", MILLISECOND), ("us", MICRO), ("ns", NANO)],
             Channel::Psec | Channel::Position | Channel::MotorPosition | Channel::WindUp => match linear {
-                true => vec![("m", 1.0), ("mm", MILLIMETER), ("um", MICRO)],
+                true => vec![("m", 1.0), ("mm", MILLIMETER), ("um", MICRO), ("in", INCH)],
                 false => vec![("rad", 1.0), ("deg", DEGREE), ("mdeg", DEGREE * MILLI)],
             },
             Channel::Velocity => speeds(),
@@ -115,8 +119,14 @@ const MICRO: f64 = 1e-6;
 const NANO: f64 = 1e-9;
 
 /// Units of the velocity of a linear axis, with factors to m/s.
-const LINEAR_SPEEDS: [(&str, f64); 4] =
-    [("m/s", 1.0), ("mm/s", MILLIMETER), ("m/min", METER_PER_MINUTE), ("mm/min", MILLIMETER / MINUTE)];
+const LINEAR_SPEEDS: [(&str, f64); 6] = [
+    ("m/s", 1.0),
+    ("mm/s", MILLIMETER),
+    ("m/min", METER_PER_MINUTE),
+    ("mm/min", MILLIMETER / MINUTE),
+    ("in/s", INCH),
+    ("in/min", INCH / MINUTE),
+];
 /// Units of the velocity of a rotary axis, with factors to rad/s.
 const ANGULAR_SPEEDS: [(&str, f64); 4] =
     [("rad/s", 1.0), ("deg/s", DEGREE), ("deg/min", DEGREE / MINUTE), ("rpm", RPM)];
@@ -124,9 +134,9 @@ const ANGULAR_SPEEDS: [(&str, f64); 4] =
 const CURRENTS: [(&str, f64); 2] = [("A", 1.0), ("mA", MILLI)];
 
 /// Symbols of all units except N.m.
-const SYMBOLS: [&str; 21] = [
-    "s", "ms", "us", "ns", "m", "mm", "um", "rad", "deg", "mdeg", "m/s", "mm/s", "m/min", "mm/min", "rad/s",
-    "deg/s", "deg/min", "rpm", "A", "mA", "N",
+const SYMBOLS: [&str; 24] = [
+    "s", "ms", "us", "ns", "m", "mm", "um", "in", "rad", "deg", "mdeg", "m/s", "mm/s", "m/min", "mm/min",
+    "in/s", "in/min", "rad/s", "deg/s", "deg/min", "rpm", "A", "mA", "N",
 ];
 /// Alternative spellings of symbols.
 const SPELLINGS: [(&str, &str); 12] = [
@@ -145,11 +155,15 @@ const SPELLINGS: [(&str, &str); 12] = [
 ];
 
 /// Spellings of symbols in headers, in addition to [`SPELLINGS`].
-const HEADER_SPELLINGS: [(&str, &str); 16] = [
+const HEADER_SPELLINGS: [(&str, &str); 20] = [
     ("sec", "s"),
     ("seconds", "s"),
     ("msec", "ms"),
     ("usec", "us"),
+    ("inch", "in"),
+    ("inches", "in"),
+    ("inch/min", "in/min"),
+    ("ipm", "in/min"),
     ("degree", "deg"),
     ("degrees", "deg"),
     ("Grad", "deg"),
