@@ -87,6 +87,38 @@ fn channels_of_twincat_scope_are_setpoints() {
 }
 
 #[test]
+fn commanded_positions_in_the_header_of_a_csv_file_are_setpoints() {
+    let text = "datetime;Y Commanded (in);Y Actual (in);X1_CommandPosition [mm]\n2024-03-01 10:00:00.000;1;1.01;5\n\
+                2024-03-01 10:00:00.004;2;1.99;6\n";
+    let (csv, findings) = read(text, &[], None).expect("setpoints");
+    assert_eq!(rows(&csv, "time,x,y"), [[0.0, 5e-3, 0.0254], [0.004, 6e-3, 0.0508]]);
+    assert_eq!(findings, ["detected-columns", "detected-columns"]);
+    // A mapping without a unit takes that of the header.
+    let (csv, _) = read(text, &["y=Y Actual (in)"], None).expect("setpoints");
+    assert!((rows(&csv, "time,y")[0][1] - 1.01 * 0.0254).abs() < 1e-15, "{csv}");
+    let error = read("time,pos_x,cmd_pos_x\n0,1,1\n", &[], None).expect_err("no unit");
+    assert!(
+        error.contains("does not state the unit of column cmd_pos_x; give it by --column 'x=cmd_pos_x[mm]'")
+    );
+}
+
+#[test]
+fn csv_of_commanded_positions_is_told_from_other_text() {
+    let folder = TestFolder::new("recorded_psec_detection");
+    for (text, wanted) in [
+        ("Unnamed: 0,time,pos_x,cmd_pos_x\n0,0,1,1\n", true),
+        ("Zeit;x_soll [mm]\n0;0\n", true),
+        ("time,x\n0,0\n", false),
+        ("time,x position [mm]\n0,0\n", false),
+        ("joint_names: [x, y]\npoints: []\n", false),
+        ("N10 G1 X5 Y5\n", false),
+        ("", false),
+    ] {
+        assert_eq!(RecordedPsec::detects(&folder.file("log", text)), wanted, "{text}");
+    }
+}
+
+#[test]
 fn invalid_mappings_are_rejected() {
     let error = |columns: &[&str]| read("0 1 2\n1 2 3\n", columns, Some(10.0)).expect_err("invalid");
     for (columns, reason) in [

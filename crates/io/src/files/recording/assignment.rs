@@ -152,7 +152,7 @@ impl Context<'_> {
         for ((index, channel), direct) in places.filter(|((_, channel), _)| self.is_read(*channel)) {
             let factor = factors.get(index).copied().unwrap_or(1.0);
             let choice = match direct {
-                Some(column) => Some((column, factor)),
+                Some(column) => Some((column, selector.stated_factor(channel, column)?.unwrap_or(factor))),
                 None if self.has_selected_column(channel) => None,
                 None => selector.choose(channel, &mut assignment)?,
             };
@@ -356,6 +356,41 @@ impl<'a> Selector<'a> {
         fitting.retain(|column| column.axis.as_deref().map_or(is_only, |other| other == axis));
     }
 
+    /// Returns the factor to SI that the header of a column states which a mapping names without a unit.
+    fn stated_factor(&self, channel: Channel, place: usize) -> Found<Option<f64>> {
+        let mapping = self.context.columns.mapping(channel).filter(|mapping| mapping.unit.is_none());
+        let column = self.found.get(place).filter(|_| mapping.is_some());
+        let Some((column, unit)) = column.and_then(|column| Some((column, column.unit.as_ref()?))) else {
+            return Ok(None);
+        };
+        match unit.factor(channel, self.context.axis) {
+            ColumnFactor::Value(factor) => Ok(Some(factor)),
+            ColumnFactor::Samples => Ok(None),
+            problem => Err(self.unit_error(channel, column, problem)),
+        }
+    }
+
+    /// Returns the error of a column whose unit is unknown or not that of the channel.
+    fn unit_error(&self, channel: Channel, column: &FoundColumn, problem: ColumnFactor) -> FileError {
+        let unit = column.unit.as_ref().map_or_else(String::new, ToString::to_string);
+        let found = match problem {
+            ColumnFactor::Unfit => format!("is in {unit}"),
+            _ => format!("has the {}", unit.replacen("unknown:", "unknown unit", 1)),
+        };
+        let allowed: Vec<&str> = channel.units(self.context.axis).iter().map(|(symbol, _)| *symbol).collect();
+        let example = match allowed.contains(&"mm") {
+            true => "25.4 mm".to_owned(),
+            false => format!("0.5 {}", allowed.first().unwrap_or(&"")),
+        };
+        let reason = format!(
+            "{channel} from column {} {found}, must be in one of {}; give the unit by --column \
+             '{channel}=COLUMN[UNIT]', for example with a factor: [{example}]",
+            shortened(&column.header),
+            allowed.join(", ")
+        );
+        FileError::new((self.at)(), reason)
+    }
+
     fn accept(
         &self,
         channel: Channel,
@@ -378,22 +413,7 @@ impl<'a> Selector<'a> {
             (ColumnFactor::Samples, Some(_)) => 1.0,
             (ColumnFactor::Samples, None) => return Ok(None),
             (problem @ (ColumnFactor::Unfit | ColumnFactor::Unknown), _) => {
-                let found = match problem {
-                    ColumnFactor::Unfit => format!("is in {unit}"),
-                    _ => format!("has the {}", unit.to_string().replacen("unknown:", "unknown unit", 1)),
-                };
-                let allowed: Vec<&str> = channel.units(context.axis).iter().map(|(s, _)| *s).collect();
-                let example = match allowed.contains(&"mm") {
-                    true => "25.4 mm".to_owned(),
-                    false => format!("0.5 {}", allowed.first().unwrap_or(&"")),
-                };
-                let reason = format!(
-                    "{channel} from column {} {found}, must be in one of {}; give the unit by --column \
-                     '{channel}=COLUMN[UNIT]', for example with a factor: [{example}]",
-                    shortened(&column.header),
-                    allowed.join(", ")
-                );
-                let error = FileError::new((self.at)(), reason);
+                let error = self.unit_error(channel, column, problem);
                 // Without the current there is neither inertia nor friction.
                 let is_unknown_current =
                     channel == Channel::Current && matches!(problem, ColumnFactor::Unknown);

@@ -7,11 +7,12 @@ use std::path::Path;
 use super::columns::{Column, Columns, Mapping, column_and_unit};
 use super::context::{Context, RecordingOptions};
 use super::format::{Found, MAX_ROWS, RecordingFormat};
-use super::found_column::{ColumnFactor, FoundColumn};
+use super::found_column::{ColumnFactor, ColumnUnit, FoundColumn};
 use super::unit::{Channel, Unit};
 use super::{RecordingColumns, inspect_recording, read_head, read_stream};
 use crate::files::error::{FileError, MAX_LISTED};
-use virtual_axes_core::config::AxisConfig;
+use crate::files::input::kind_from_head;
+use virtual_axes_core::config::{AxisConfig, AxisKind};
 use virtual_axes_core::text::{nearest_hint, nearest_name, shortened};
 use virtual_axes_identify::recording::{Finding, Severity};
 
@@ -103,15 +104,20 @@ impl RecordedPsec {
         Ok((RecordedPsec { times: pick(&times), positions, resolutions, next: 0, line }, findings))
     }
 
-    /// Returns true if a regular file has the content of a recording of a control: Sinumerik, TwinCAT or LinuxCNC.
+    /// Returns true if a regular file has the content of a recording of a control: Sinumerik, TwinCAT, LinuxCNC, or CSV
+    /// whose header names commanded positions of axes.
     pub fn detects(path: &Path) -> bool {
-        let head = || {
-            let mut file = File::open(path).ok()?;
-            read_head(&mut file, "", &RecordingOptions::default()).ok()
-        };
+        let options = RecordingOptions::default();
+        let head = || read_head(&mut File::open(path).ok()?, "", &options).ok();
+        let is_named = |column: &FoundColumn| column.channel == Some(Channel::Psec) && column.axis.is_some();
         path.is_file()
-            && head()
-                .is_some_and(|(format, _)| !matches!(format, RecordingFormat::Csv | RecordingFormat::Mcap))
+            && match head() {
+                Some((RecordingFormat::Csv, head)) if kind_from_head(&head).is_none() => {
+                    inspect_recording(path, &options).is_ok_and(|found| found.columns.iter().any(is_named))
+                }
+                Some((format, _)) => !matches!(format, RecordingFormat::Csv | RecordingFormat::Mcap),
+                None => false,
+            }
     }
 
     /// Returns the values of the last digits of the axes, m or rad; infinite if unknown.
@@ -210,6 +216,16 @@ fn detected<'a>(
             );
             return Err(FileError::new(name, reason));
         };
+        if column.unit.as_ref().is_some_and(ColumnUnit::is_assumed) {
+            let unit = if axis.kind == AxisKind::Linear { "mm" } else { "deg" };
+            let header = shortened(&column.header);
+            let reason = format!(
+                "the file does not state the unit of column {header}; give it by {OPTION} '{}={header}[{unit}]', and the columns \
+                 of other axes likewise",
+                axis.name
+            );
+            return Err(FileError::new(name, reason));
+        }
         let factor = column.unit.as_ref().map(|unit| unit.factor(Channel::Psec, axis));
         let (Some(ColumnFactor::Value(factor)), Some((symbol, _))) =
             (factor, Channel::Psec.units(axis).first().copied())

@@ -52,7 +52,7 @@ const WORDS: &[(WordMeaning, &[&str])] = &[
     (WordMeaning::Quantity(Torque), &["torque", "trq", "moment", "drehmoment", "force", "kraft"]),
     // The first word of "wind_up" and "wind-up".
     (WordMeaning::Quantity(WindUp), &["wind", "windup"]),
-    (WordMeaning::Quantity(Time), &["time", "zeit", "timestamp", "zeitstempel"]),
+    (WordMeaning::Quantity(Time), &["time", "zeit", "timestamp", "datetime", "zeitstempel"]),
     (WordMeaning::Quantity(Counter), &["sample", "samples", "cycle", "cycles"]),
     (
         Setpoint,
