@@ -9,6 +9,9 @@
 //! - The control stops between rapid traverse and feed.
 //! - Look-ahead: the speed allows a stop at the end of the last motion that is ahead.
 
+mod corner_geometry;
+mod segment;
+
 use std::collections::VecDeque;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -25,13 +28,12 @@ use super::piece::{Overlap, Piece, PieceCurve, TimedCurve};
 use super::pieces::PieceSource;
 use super::planned_interval::PlannedInterval;
 use super::source::Part;
-use super::vector::{JointVector, MAX_JOINTS, norm};
+use super::vector::{JointVector, norm};
 
-/// Change of direction below which a path is straight, and distance from a reversal at which it is one, rad.
-const STRAIGHT: f64 = 1e-7;
-const REVERSAL: f64 = 1e-3;
-/// Shortest part of a motion that is executed, m.
-const LEAST_LENGTH: f64 = 1e-9;
+use corner_geometry::{
+    REVERSAL, STRAIGHT, angle_between, are_coplanar, corner_radius, is_spatial, rotary_length,
+};
+use segment::{JerkPhase, LEAST_LENGTH, SegmentEnd, SpeedSegment, phases};
 
 /// Motion of the program before its end is known.
 #[derive(Debug)]
@@ -60,50 +62,13 @@ struct Block {
     is_spatial: bool,
 }
 
-/// End of a segment.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Junction {
-    /// Continues with at most this speed, m/s.
-    Through(f64),
-    Stop,
-    /// The next motion starts at the latest when this speed is left, m/s.
-    Overlap(f64),
-}
-
-/// Part of the path with constant limits.
-#[derive(Debug)]
-struct Segment {
-    piece: Arc<Piece>,
-    scale: f64,
-    /// Start, from the start of the piece, in the path parameter.
-    from: f64,
-    /// Length, m.
-    length: f64,
-    speed: f64,
-    entry_speed: f64,
-    acceleration: f64,
-    jerk: f64,
-    end: Junction,
-}
-
 /// Element of the planned path.
 #[derive(Debug)]
 enum Element {
-    Segment(Segment),
+    Segment(SpeedSegment),
     Standstill(ProgramStop),
     /// Wait for the end of the filtered motion.
     Settling(ProgramActivity),
-}
-
-/// Phase of constant jerk, which is 0 without a jerk limit.
-#[derive(Debug, Clone, Copy)]
-struct Phase {
-    duration: f64,
-    /// Distance from the start of the segment, m, speed and acceleration at the start of the phase.
-    at: f64,
-    speed: f64,
-    acceleration: f64,
-    jerk: f64,
 }
 
 /// Last part of a motion that overlaps with the next one.
@@ -183,9 +148,9 @@ impl TrapezoidPlanner {
             let Element::Segment(segment) = element else { return true };
             segments += 1;
             match segment.end {
-                Junction::Through(_) => {}
-                Junction::Stop => return true,
-                Junction::Overlap(_) => return i > 0 || self.elements.len() > 1,
+                SegmentEnd::Through(_) => {}
+                SegmentEnd::Stop => return true,
+                SegmentEnd::Overlap(_) => return i > 0 || self.elements.len() > 1,
             }
         }
         segments > self.control.look_ahead
@@ -197,7 +162,7 @@ impl TrapezoidPlanner {
         let mut known = 1;
         for element in self.elements.iter().take(self.control.look_ahead + 1) {
             match element {
-                Element::Segment(Segment { end: Junction::Through(_), .. }) => known += 1,
+                Element::Segment(SpeedSegment { end: SegmentEnd::Through(_), .. }) => known += 1,
                 _ => break,
             }
         }
@@ -209,7 +174,7 @@ impl TrapezoidPlanner {
                 speed = 0.0;
                 continue;
             };
-            let Junction::Through(limit) = before.end else {
+            let SegmentEnd::Through(limit) = before.end else {
                 speed = 0.0;
                 continue;
             };
@@ -259,7 +224,7 @@ impl TrapezoidPlanner {
     fn close(&mut self) {
         let Some(mut block) = self.block.take() else { return };
         block.is_overlapping |= matches!(curve(&block.piece).at_end, CurveEnd::Blend(_));
-        self.push(&block, 0.0, Junction::Stop);
+        self.push(&block, 0.0, SegmentEnd::Stop);
     }
 
     /// Returns a motion with its limits.
@@ -352,7 +317,7 @@ impl TrapezoidPlanner {
         let is_straight = angle < STRAIGHT || kink_speed > before.speed.max(next.speed);
         match first.at_end {
             CurveEnd::Stop => {
-                self.push(&before, 0.0, Junction::Stop);
+                self.push(&before, 0.0, SegmentEnd::Stop);
                 if self.control.filter_time() > 0.0 {
                     let (line, tool) = (first.line, first.tool);
                     self.elements.push_back(Element::Settling(ProgramActivity {
@@ -364,11 +329,11 @@ impl TrapezoidPlanner {
             }
             CurveEnd::ExactPath => {
                 (before.has_kink, next.has_kink) = (before.has_kink || !is_straight, !is_straight);
-                let end = if is_straight { Junction::Through(f64::INFINITY) } else { Junction::Stop };
+                let end = if is_straight { SegmentEnd::Through(f64::INFINITY) } else { SegmentEnd::Stop };
                 self.push(&before, 0.0, end);
             }
             CurveEnd::Blend(_) if is_rapid(first) != is_rapid(second) => {
-                self.push(&before, 0.0, Junction::Stop)
+                self.push(&before, 0.0, SegmentEnd::Stop)
             }
             // The start of the next motion within the end of this one allows about half of the lower speed.
             CurveEnd::Blend(_)
@@ -379,7 +344,7 @@ impl TrapezoidPlanner {
                     && kink_speed > 0.5 * before.speed.min(next.speed) =>
             {
                 (before.has_kink, next.has_kink) = (before.has_kink || !is_straight, !is_straight);
-                self.push(&before, 0.0, Junction::Through(kink_speed));
+                self.push(&before, 0.0, SegmentEnd::Through(kink_speed));
             }
             CurveEnd::Blend([tolerance, rotary])
                 if !is_blendable && self.control.corners == CornerRule::Arc =>
@@ -392,26 +357,26 @@ impl TrapezoidPlanner {
                     if spatial > 0.0 { tolerance / spatial } else { rotary_length(rotary, model) };
                 let deviation = tolerance / (0.5 * angle).sin().max(STRAIGHT);
                 let speed = 2.0 * (self.acceleration(&before) * deviation).sqrt();
-                self.push(&before, 0.0, Junction::Overlap(speed));
+                self.push(&before, 0.0, SegmentEnd::Overlap(speed));
             }
             CurveEnd::Blend(_) if angle > PI - REVERSAL || !is_blendable => {
-                self.push(&before, 0.0, Junction::Stop)
+                self.push(&before, 0.0, SegmentEnd::Stop)
             }
-            CurveEnd::Blend(_) if is_straight => self.push(&before, 0.0, Junction::Through(f64::INFINITY)),
+            CurveEnd::Blend(_) if is_straight => self.push(&before, 0.0, SegmentEnd::Through(f64::INFINITY)),
             CurveEnd::Blend([tolerance, _]) => match self.control.corners {
                 CornerRule::Arc => {
                     let corner = [angle, tolerance, kink_speed];
                     self.corner(&mut before, &mut next, &tangents, corner, model);
                 }
-                CornerRule::Stop => self.push(&before, 0.0, Junction::Stop),
+                CornerRule::Stop => self.push(&before, 0.0, SegmentEnd::Stop),
                 CornerRule::VelocityStep => {
                     let speed = self.control.corner_velocity / (2.0 * (0.5 * angle).sin());
-                    self.push(&before, 0.0, Junction::Through(speed));
+                    self.push(&before, 0.0, SegmentEnd::Through(speed));
                 }
                 CornerRule::Deviation => {
                     let normal = self.corner_acceleration(&tangents, model)[0];
                     let speed = (normal * corner_radius(angle, tolerance)).sqrt();
-                    self.push(&before, 0.0, Junction::Through(speed));
+                    self.push(&before, 0.0, SegmentEnd::Through(speed));
                 }
             },
         }
@@ -467,16 +432,16 @@ impl TrapezoidPlanner {
         let cuts = [cut / before.scale, cut / next.scale];
         let length = cuts[0] + cuts[1];
         if length * before.scale < LEAST_LENGTH {
-            self.push(before, 0.0, Junction::Stop);
+            self.push(before, 0.0, SegmentEnd::Stop);
             return;
         }
         let speed = fastest.min((normal * radius).sqrt());
         if kink_speed > speed {
             (before.has_kink, next.has_kink) = (true, true);
-            self.push(before, 0.0, Junction::Through(kink_speed));
+            self.push(before, 0.0, SegmentEnd::Through(kink_speed));
             return;
         }
-        self.push(before, cut, Junction::Through(speed));
+        self.push(before, cut, SegmentEnd::Through(speed));
         let start = first.point(first.length - cuts[0]);
         let curve = if first.is_line() && second.is_line() {
             PieceCurve::Corner(CornerArc::new(start, tangents, [radius, angle], length))
@@ -495,7 +460,7 @@ impl TrapezoidPlanner {
             ))
         };
         let piece = before.piece.part(curve, length, before.piece.start + first.length - cuts[0]);
-        self.push_segment(Segment {
+        self.push_segment(SpeedSegment {
             piece: Arc::new(piece),
             scale: radius * angle / length,
             from: 0.0,
@@ -504,7 +469,7 @@ impl TrapezoidPlanner {
             entry_speed: speed,
             acceleration: tangential,
             jerk: before.jerk.min(next.jerk),
-            end: Junction::Through(f64::INFINITY),
+            end: SegmentEnd::Through(f64::INFINITY),
         });
         next.cut = cut;
     }
@@ -521,14 +486,14 @@ impl TrapezoidPlanner {
     }
 
     /// Appends a motion without the length `cut` at its end.
-    fn push(&mut self, block: &Block, cut: f64, end: Junction) {
+    fn push(&mut self, block: &Block, cut: f64, end: SegmentEnd) {
         let length = block.scale * block.piece.length - block.cut - cut;
         let mut acceleration = self.acceleration(block);
         let bend_speed = block.bend_speed * self.kink_share(block).sqrt();
         let most = bend_speed.min(block.scale * block.piece.length / self.control.block_cycle);
         let (mut speed, mut entry_speed) = (block.speed.min(most), block.entry_speed.min(most));
         // The rest of a line that is short at the speed of the corner becomes part of it.
-        if let Junction::Through(corner) = end
+        if let SegmentEnd::Through(corner) = end
             && cut > 0.0
             && curve(&block.piece).is_line()
             && length < self.control.gap_cycles * self.control.block_cycle * corner
@@ -536,7 +501,7 @@ impl TrapezoidPlanner {
             acceleration *= self.control.tangential_fraction;
             (speed, entry_speed) = (speed.min(corner), entry_speed.min(corner));
         }
-        self.push_segment(Segment {
+        self.push_segment(SpeedSegment {
             piece: Arc::clone(&block.piece),
             scale: block.scale,
             from: block.cut / block.scale,
@@ -549,15 +514,15 @@ impl TrapezoidPlanner {
         });
     }
 
-    fn push_segment(&mut self, segment: Segment) {
-        if segment.length < LEAST_LENGTH && matches!(segment.end, Junction::Through(_)) {
+    fn push_segment(&mut self, segment: SpeedSegment) {
+        if segment.length < LEAST_LENGTH && matches!(segment.end, SegmentEnd::Through(_)) {
             return;
         }
         self.elements.push_back(Element::Segment(segment));
     }
 
     /// Appends the motion along a segment to the entries.
-    fn execute(&mut self, segment: &Segment, exit: f64, entries: &mut VecDeque<PlannedInterval>) {
+    fn execute(&mut self, segment: &SpeedSegment, exit: f64, entries: &mut VecDeque<PlannedInterval>) {
         let exit = exit.min(segment.reachable(self.speed)).max(segment.slowed(self.speed));
         let phases = phases(segment, [self.speed, exit]);
         let total: f64 = phases.iter().map(|phase| phase.duration).sum();
@@ -591,8 +556,8 @@ impl TrapezoidPlanner {
     }
 
     /// Returns the part of the last phase during which the next motion starts.
-    fn tail_duration(&self, segment: &Segment, phases: &[Phase]) -> f64 {
-        let (Junction::Overlap(most), Some(last), Some(Element::Segment(next))) =
+    fn tail_duration(&self, segment: &SpeedSegment, phases: &[JerkPhase]) -> f64 {
+        let (SegmentEnd::Overlap(most), Some(last), Some(Element::Segment(next))) =
             (segment.end, phases.last(), self.elements.front())
         else {
             return 0.0;
@@ -610,129 +575,6 @@ impl TrapezoidPlanner {
     }
 }
 
-impl Phase {
-    /// Returns the state in the path parameter of the piece, `time` after the start of the phase.
-    fn state(&self, time: f64, segment: &Segment) -> PathState {
-        PathState {
-            u: segment.from + (self.at + self.distance(time)) / segment.scale,
-            rate: (self.speed + time * (self.acceleration + 0.5 * time * self.jerk)).max(0.0) / segment.scale,
-            acceleration: (self.acceleration + time * self.jerk) / segment.scale,
-        }
-    }
-
-    /// Returns the distance covered `time` after the start of the phase, m.
-    fn distance(&self, time: f64) -> f64 {
-        time * (self.speed + time * (0.5 * self.acceleration + time * self.jerk / 6.0))
-    }
-}
-
-impl Segment {
-    /// Returns the times of a change of speed: of each of the two parts of constant jerk, and of constant acceleration.
-    fn change(&self, speeds: [f64; 2]) -> [f64; 2] {
-        let change = (speeds[1] - speeds[0]).abs();
-        let jerk_time = (self.acceleration / self.jerk).min((change / self.jerk).sqrt());
-        [jerk_time, (change / self.acceleration - jerk_time).max(0.0)]
-    }
-
-    /// Returns the distance of a change of speed, m.
-    fn change_length(&self, speeds: [f64; 2]) -> f64 {
-        let [jerk_time, constant] = self.change(speeds);
-        0.5 * (speeds[0] + speeds[1]) * (2.0 * jerk_time + constant)
-    }
-
-    /// Returns the speed at the end of the segment after slowing down from another one all along it, m/s.
-    fn slowed(&self, speed: f64) -> f64 {
-        (speed * speed - 2.0 * self.acceleration * self.length).max(0.0).sqrt()
-    }
-
-    /// Returns the speed that is reached from another one along the segment, m/s.
-    fn reachable(&self, speed: f64) -> f64 {
-        let most = (speed * speed + 2.0 * self.acceleration * self.length).sqrt();
-        if self.jerk.is_infinite() {
-            return most;
-        }
-        largest([speed, most], |end| self.change_length([speed, end]) <= self.length)
-    }
-}
-
-/// Number of halvings that find a speed.
-const HALVINGS: usize = 60;
-
-/// Returns the largest number in a range that fits; the first one does.
-fn largest([mut fitting, mut most]: [f64; 2], fits: impl Fn(f64) -> bool) -> f64 {
-    if fits(most) {
-        return most;
-    }
-    for _ in 0..HALVINGS {
-        let middle = f64::midpoint(fitting, most);
-        if fits(middle) { fitting = middle } else { most = middle }
-    }
-    fitting
-}
-
-/// Returns the radius of the arc that passes a corner at a distance, m.
-fn corner_radius(angle: f64, distance: f64) -> f64 {
-    let cosine = (0.5 * angle).cos();
-    distance * cosine / (1.0 - cosine)
-}
-
-/// Returns the motion along a segment between two speeds.
-fn phases(segment: &Segment, [start, end]: [f64; 2]) -> Vec<Phase> {
-    let &Segment { length, speed, acceleration: a, .. } = segment;
-    if length < LEAST_LENGTH {
-        return Vec::new();
-    }
-    if segment.jerk.is_finite() {
-        return jerk_limited_phases(segment, [start, end]);
-    }
-    let reachable = (0.5 * (start * start + end * end) + a * length).sqrt();
-    let peak = speed.max(end).min(reachable);
-    let mut phases = Vec::with_capacity(3);
-    let mut at = 0.0;
-    let mut push = |duration: f64, speed: f64, acceleration: f64| {
-        if duration > 0.0 {
-            phases.push(Phase { duration, at, speed, acceleration, jerk: 0.0 });
-            at += duration * (speed + 0.5 * duration * acceleration);
-        }
-    };
-    if reachable <= start.max(end) {
-        push(2.0 * length / (start + end), start, (end * end - start * start) / (2.0 * length));
-        return phases;
-    }
-    // The start can be faster than the feed.
-    let ramps = ((peak * peak - start * start).abs() + peak * peak - end * end) / (2.0 * a);
-    push((peak - start).abs() / a, start, a * (peak - start).signum());
-    push((length - ramps).max(0.0) / peak, peak, 0.0);
-    push((peak - end) / a, peak, -a);
-    phases
-}
-
-/// Returns the motion along a segment between two speeds within its jerk limit.
-fn jerk_limited_phases(segment: &Segment, [start, end]: [f64; 2]) -> Vec<Phase> {
-    let ramps = |peak: f64| segment.change_length([start, peak]) + segment.change_length([peak, end]);
-    let least = start.max(end);
-    let peak = largest([least, segment.speed.max(least)], |peak| ramps(peak) <= segment.length);
-    let cruise = (segment.length - ramps(peak)).max(0.0) / peak;
-    let mut phases: Vec<Phase> = Vec::with_capacity(7);
-    let mut at = 0.0;
-    let mut push = |duration: f64, speed: f64, acceleration: f64, jerk: f64| {
-        if duration > 0.0 {
-            let phase = Phase { duration, at, speed, acceleration, jerk };
-            at += phase.distance(duration);
-            phases.push(phase);
-        }
-    };
-    for (speeds, sign, cruise) in [([start, peak], 1.0, cruise), ([peak, end], -1.0, 0.0)] {
-        let [jerk_time, constant] = segment.change(speeds);
-        let (jerk, acceleration) = (sign * segment.jerk, sign * segment.jerk * jerk_time);
-        push(jerk_time, speeds[0], 0.0, jerk);
-        push(constant, speeds[0] + 0.5 * acceleration * jerk_time, acceleration, 0.0);
-        push(jerk_time, speeds[1] - 0.5 * acceleration * jerk_time, acceleration, -jerk);
-        push(cruise, peak, 0.0, 0.0);
-    }
-    phases
-}
-
 /// Returns the exact curve of a motion.
 fn curve(piece: &Piece) -> &MotionCurve {
     match &piece.curve {
@@ -741,48 +583,8 @@ fn curve(piece: &Piece) -> &MotionCurve {
     }
 }
 
-/// Returns true if two motions that meet lie in the plane of the arcs among them.
-fn are_coplanar(curves: [&MotionCurve; 2], tangents: &[JointVector; 2], model: &MachineModel) -> bool {
-    curves.iter().all(|curve| match &curve.shape {
-        Shape::Arc(arc) => (0..model.joints.len())
-            .filter(|joint| !arc.plane.contains(joint))
-            .all(|joint| tangents.iter().all(|tangent| tangent[joint].abs() < STRAIGHT)),
-        _ => true,
-    })
-}
-
-/// Returns true for X, Y and Z.
-fn is_spatial(model: &MachineModel, joint: usize) -> bool {
-    model.kinds.linear.iter().position(|&linear| linear == joint).is_some_and(|position| position < 3)
-}
-
-/// Returns a rotary tolerance in the metric of the path, m.
-fn rotary_length(tolerance: f64, model: &MachineModel) -> f64 {
-    let Some(&joint) = model.kinds.rotary.first() else { return tolerance };
-    let mut step = [0.0; MAX_JOINTS];
-    step[joint] = tolerance;
-    model.kinds.length(&step)
-}
-
-/// Returns the change of direction of X, Y and Z; a motion without them counts as one along X.
-fn angle_between(tangents: &[JointVector; 2], model: &MachineModel) -> f64 {
-    let linear = &model.kinds.linear;
-    let unit = tangents.each_ref().map(|tangent| -> JointVector {
-        let length = norm(tangent, linear);
-        std::array::from_fn(|i| match length > 0.0 {
-            true => tangent[i] / length,
-            false => f64::from(linear.first() == Some(&i)),
-        })
-    });
-    let half = |sign: f64| {
-        let sum: f64 = linear.iter().map(|&i| (unit[0][i] + sign * unit[1][i]).powi(2)).sum();
-        sum.sqrt()
-    };
-    2.0 * half(-1.0).atan2(half(1.0))
-}
-
 /// Returns the motion along a part of a segment.
-fn alone(segment: &Segment, state: PathState, jerk: f64, duration: f64) -> PlannedInterval {
+fn alone(segment: &SpeedSegment, state: PathState, jerk: f64, duration: f64) -> PlannedInterval {
     let length = duration * (state.rate + duration * (0.5 * state.acceleration + duration * jerk / 6.0));
     let law = Law::Jerk { rate: state.rate, acceleration: state.acceleration, jerk };
     let motion = IntervalMotion { law, length, duration };
@@ -790,7 +592,13 @@ fn alone(segment: &Segment, state: PathState, jerk: f64, duration: f64) -> Plann
 }
 
 /// Returns the end of the motion before, from `time` on, together with the start of a segment.
-fn overlap(segment: &Segment, state: PathState, tail: &Tail, time: f64, duration: f64) -> PlannedInterval {
+fn overlap(
+    segment: &SpeedSegment,
+    state: PathState,
+    tail: &Tail,
+    time: f64,
+    duration: f64,
+) -> PlannedInterval {
     let after = |state: PathState, time: f64| PathState {
         u: state.u + time * (state.rate + 0.5 * time * state.acceleration),
         rate: (state.rate + time * state.acceleration).max(0.0),
