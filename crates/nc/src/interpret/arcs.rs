@@ -25,7 +25,9 @@ const MAX_RADIUS_ERROR: f64 = 0.5 * MILLIMETER;
 impl State {
     /// Executes an arc.
     pub(super) fn arc(&mut self, block: &mut LineWords, is_clockwise: bool) -> Outcome<()> {
-        let turns = block.take('P').unwrap_or(1.0);
+        // P of Marlin are full circles before the arc.
+        let before = if self.dialect == Dialect::Marlin { 1.0 } else { 0.0 };
+        let turns = block.take('P').map_or(1.0, |turns| turns + before);
         if turns.fract() != 0.0 || !(1.0..=MAX_TURNS).contains(&turns) {
             return Err(format!("word P: {turns} turns, an integer from 1 to {MAX_TURNS} is required"));
         }

@@ -401,7 +401,7 @@ impl Codes {
                 continue;
             }
             match is_auxiliary(code, dialect) {
-                true => codes.without_effect.push((format!("M{code}"), "PQRSELIJK")),
+                true => codes.without_effect.push((format!("M{code}"), auxiliary_letters(dialect))),
                 false => codes.unsupported.push((format!("M{code}"), m_remedy(number))),
             }
         }
@@ -409,10 +409,17 @@ impl Codes {
     }
 }
 
+/// Returns the letters that belong to an auxiliary function. Settings of firmware have values for each axis.
+fn auxiliary_letters(dialect: Dialect) -> &'static str {
+    if dialect == Dialect::Marlin { "ABCDEFHIJKLOPQRSTUVWXYZ" } else { "PQRSELIJK" }
+}
+
 /// Returns true for an auxiliary function of a machine builder or user, which moves no axis.
 fn is_auxiliary(code: u32, dialect: Dialect) -> bool {
     let last = if dialect == Dialect::LinuxCnc { 199 } else { 9999 };
-    (10..=last).contains(&code) && !matches!(code, 96 | 97)
+    // M206, M218 and M290 of firmware shift the coordinates.
+    let shifts = dialect == Dialect::Marlin && matches!(code, 206 | 218 | 290);
+    (10..=last).contains(&code) && !matches!(code, 96 | 97) && !shifts
 }
 
 fn remedy(code: u16, dialect: Dialect) -> String {
@@ -435,6 +442,11 @@ fn remedy(code: u16, dialect: Dialect) -> String {
 
 fn m_remedy(code: u16) -> String {
     match MCodes::dialects(code) {
+        0 if matches!(code, 206 | 218 | 290) => {
+            format!(
+                "it shifts the coordinates: set a work offset in its place, or skip it with --ignore M{code}"
+            )
+        }
         0 => format!("skip it with --ignore M{code}"),
         _ => format!("known in --dialect haas; or skip it with --ignore M{code}"),
     }

@@ -113,7 +113,9 @@ impl LineWords {
         let ignored = &state.options.ignored;
         let word = scanner.rest();
         let letter = scanner.take().unwrap_or_default();
-        if state.dialect != Dialect::LinuxCnc && b"xyzabc".contains(&letter) && scanner.has_no_value() {
+        // I of M3 and M5 in Marlin follows the motion.
+        let alone: &[u8] = if state.dialect == Dialect::Marlin { b"xyzabci" } else { b"xyzabc" };
+        if state.dialect != Dialect::LinuxCnc && alone.contains(&letter) && scanner.has_no_value() {
             // A letter alone, as in G28 X.
             self.given |= 1 << index(letter);
             return Ok(());

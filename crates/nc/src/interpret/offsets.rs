@@ -1,5 +1,7 @@
 //! Offsets and references: G10, G28, G30, G40 to G44, G49, G52 to G59.3, G92.
 
+use virtual_axes_core::units::{MILLIMETER, Rounded};
+
 use super::codes::{
     Action, Codes, CoordinateSystem, CutterCompensation, KinematicsSwitch, ToolLength, g_name,
 };
@@ -355,10 +357,13 @@ impl State {
         }
         let missing = || format!("tool {number} is not in the tool table");
         let length = self.options.default_tool_length.ok_or_else(missing)?;
-        // The length of the machine file is given; 0 is an assumption.
-        if length == 0.0 {
-            self.assume(format!("{}: length 0", missing()));
-        }
+        self.assume(match length {
+            0.0 => format!("{}: length 0", missing()),
+            _ => format!(
+                "tools without entry in the tool table have the tool length of the machine, {} mm",
+                Rounded(length / MILLIMETER)
+            ),
+        });
         Ok(length)
     }
 
@@ -386,6 +391,9 @@ impl State {
                     block.take('D').ok_or("G41.1 and G42.1 require D, the diameter of the tool")?;
                 block.skip("L");
                 0.5 * diameter * self.modal.length
+            }
+            Left | Right if self.dialect == Dialect::Mach3 && block.get('P').is_some() => {
+                block.take('P').unwrap_or_default() * self.modal.length
             }
             Left | Right => {
                 let mut number = block.take_integer('D')?;

@@ -168,6 +168,8 @@ pub(super) struct Cycle {
     pub peck: Option<f64>,
     /// Words I, J and K: first peck, its reduction and the least peck, or a lateral shift, m.
     pub extra: [Option<f64>; 3],
+    /// Factor of feed and speed on the way out of a thread (J of Haas).
+    pub retraction_factor: Option<f64>,
 }
 
 /// NURBS between G5.2 and G5.3.

@@ -434,7 +434,6 @@ fn alarms_and_missing_lines_are_rejected() {
             "O1\nG68.2 P3 Q1 X0 I0 J0 K1.\nG68.2 P3 Q2 K1.\n",
             "part.nc:3: G68.2: points on a line, or vectors of the same direction, give no plane",
         ),
-        ("O1\nIF[#1EQ1]X5.\n", "part.nc:2: X5.: IF requires GOTO or THEN"),
     ] {
         let error = steps(text, options(Dialect::Haas)).expect_err(text).to_string();
         assert!(error.starts_with(expected), "{text:?}: {error}");

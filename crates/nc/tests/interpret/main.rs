@@ -3,6 +3,7 @@
 mod arcs;
 mod canonical;
 mod common;
+mod dialects;
 mod extensions;
 mod fanuc;
 mod found;

@@ -299,6 +299,9 @@ impl Sinumerik {
                 }
             };
         }
+        if let Some(rounding) = words.positive("RNDM", MAX_RATE)? {
+            self.modes.rounding = rounding * state.modal.length;
+        }
         if !self.moves(words) {
             return Ok(());
         }

@@ -177,7 +177,6 @@ const ACCEPTED: &[&str] = &[
     "VELOLIM",
     "ACCLIM",
     "ATOL",
-    "FP",
     "PL",
     "SD",
     "SR",

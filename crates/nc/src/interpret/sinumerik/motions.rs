@@ -170,9 +170,6 @@ impl Sinumerik {
             Ok(words.positive(name, MAX_RATE)?.map(|value| value * length))
         };
         let (round, chamfer, leg) = (take("RND")?, take("CHF")?, take("CHR")?);
-        if let Some(rounding) = take("RNDM")? {
-            self.modes.rounding = rounding;
-        }
         let modal = Some(self.modes.rounding);
         let corner = match (round, chamfer, leg) {
             (_, Some(length), _) => Some(length).filter(|size| *size > 0.0).map(Corner::ChamferLength),
