@@ -50,7 +50,7 @@ impl State {
     }
 
     /// Returns the center by I, J, K, m.
-    fn center_by_words(&self, block: &mut LineWords, start: &Coordinates) -> Outcome<[f64; 2]> {
+    pub(super) fn center_by_words(&self, block: &mut LineWords, start: &Coordinates) -> Outcome<[f64; 2]> {
         let [first, second, normal] = self.modal.plane.axes();
         let letters = [CENTERS[first], CENTERS[second]];
         // grbl does not read the third word; posts write it as 0.

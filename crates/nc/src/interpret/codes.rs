@@ -202,6 +202,11 @@ codes! {
     exact_stop: ExactStop, "Exact stop of one line" {
         Line = 90 in FH | OKUMA, "G9";
     }
+    surface: SurfaceCode, "Interpolation on a surface" {
+        Cylinder = 71 in FANUC, "G7.1: cylindrical interpolation";
+        Polar = 121 in FANUC, "G12.1: polar coordinate interpolation";
+        PolarOff = 131 in FANUC, "G13.1: end of polar coordinate interpolation";
+    }
     retraction: Retraction, "Retraction of canned cycles" {
         ToInitial = 980 in ALL, "G98: to the position before the cycle";
         ToPlane = 990 in ALL, "G99: to the plane R";
@@ -280,7 +285,7 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
     (80, FH | OKUMA, "P"),
     (54, FH, "Q"),
     (110, FH, ""),
-    (131, FH, ""),
+    (131, HAAS, ""),
     (220, FH | OKUMA, "XYZIJK"),
     (230, FH | OKUMA, ""),
     (250, FH, ""),

@@ -151,6 +151,10 @@ impl LineWords {
                 return Err("word N: the line number stands at the start of the line".to_owned());
             }
             b'o' => return Err(format!("{word}: an O-word stands at the start of the line")),
+            // The position of an extruder that G92 sets.
+            b'e' if state.dialect == Dialect::Marlin && self.g.contains(&920) => {
+                self.given |= 1 << index(letter);
+            }
             // Analog outputs of LinuxCNC have the word E.
             b'e' if !state.dialect.has_macro_b() && !self.m.iter().any(|code| matches!(code, 66..=68)) => {
                 return Err(format!(

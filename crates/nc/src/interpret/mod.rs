@@ -37,6 +37,7 @@ mod sinumerik;
 mod source;
 mod spline;
 mod state;
+mod surface;
 mod text;
 mod tools;
 mod work_offset;

@@ -262,7 +262,8 @@ impl State {
         let words = self.take_axes(block)?;
         if words.iter().all(Option::is_none) {
             // G92 S limits the speed of the spindle.
-            if self.dialect.has_macro_b() && code == Action::ShiftToPosition {
+            let is_spindle_limit = self.dialect.has_macro_b() && code == Action::ShiftToPosition;
+            if is_spindle_limit || block.was_given('E') {
                 return Ok(());
             }
             return Err(format!("{} requires at least one axis word", g_name(code.number())));

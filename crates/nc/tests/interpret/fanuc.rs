@@ -585,9 +585,7 @@ fn variables_of_the_memory_are_vacant_until_set() {
 fn codes_that_end_what_is_not_active_have_no_effect() {
     let text = "O1\nG0 G17 G40 G13.1 G50.2 G25\nG54.2 P0\nG54.4 P0\nG05.4 Q0\nG113\nX2. Y3.\nM30\n";
     assert_ends(Dialect::Fanuc, text, &[[2.0, 3.0, 0.0]]);
-    for (line, remedy) in
-        [("G54.2 P1", "dynamic fixture offset"), ("G60 X1.", "program G0"), ("G12.1", "polar")]
-    {
+    for (line, remedy) in [("G54.2 P1", "dynamic fixture offset"), ("G60 X1.", "program G0")] {
         let found = steps(&format!("O1\n{line}\nM30\n"), options(Dialect::Fanuc)).map(|_| ());
         assert!(found.as_ref().is_err_and(|error| error.to_string().contains(remedy)), "{line}: {found:?}");
     }

@@ -15,5 +15,6 @@ mod properties;
 mod rejections;
 mod rs274;
 mod sinumerik;
+mod surface;
 mod survey;
 mod tool_center_point;
