@@ -206,6 +206,9 @@ codes! {
         Cylinder = 71 in FANUC, "G7.1: cylindrical interpolation";
         Polar = 121 in FANUC, "G12.1: polar coordinate interpolation";
         PolarOff = 131 in FANUC, "G13.1: end of polar coordinate interpolation";
+        Cylinder107 = 1070 in FANUC, "G107: cylindrical interpolation";
+        Polar112 = 1120 in FANUC, "G112: polar coordinate interpolation";
+        PolarOff113 = 1130 in FANUC, "G113: end of polar coordinate interpolation";
     }
     retraction: Retraction, "Retraction of canned cycles" {
         ToInitial = 980 in ALL, "G98: to the position before the cycle";
@@ -305,7 +308,7 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
     (970, GRBL, ""),
     (1030, HAAS, "P"),
     (1070, HAAS, ""),
-    (1130, FH, ""),
+    (1130, HAAS, ""),
     (1300, OKUMA, ""),
     (1310, OKUMA, "DEFIJKLPR"),
     (1320, OKUMA, "DEFIJKLPR"),

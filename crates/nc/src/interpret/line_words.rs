@@ -150,7 +150,10 @@ impl LineWords {
             b'n' if state.dialect == Dialect::LinuxCnc => {
                 return Err("word N: the line number stands at the start of the line".to_owned());
             }
-            b'o' => return Err(format!("{word}: an O-word stands at the start of the line")),
+            // O of M3 in Marlin is the power of a laser.
+            b'o' if state.dialect != Dialect::Marlin || self.m.is_empty() => {
+                return Err(format!("{word}: an O-word stands at the start of the line"));
+            }
             // The position of an extruder that G92 sets.
             b'e' if state.dialect == Dialect::Marlin && self.g.contains(&920) => {
                 self.given |= 1 << index(letter);

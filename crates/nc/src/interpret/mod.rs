@@ -176,13 +176,13 @@ impl<R: BufRead + Seek> Interpreter<R> {
         if is_o_word(&self.line.text) && !self.state.dialect.has_macro_b() {
             return self.execute_o_word(place);
         }
-        if self.state.dialect == Dialect::Mach3 && self.execute_call_of_file()? {
+        if matches!(self.state.dialect, Dialect::Mach3 | Dialect::Haas) && self.execute_call_of_file()? {
             return Ok(());
         }
         self.execute_words(0)
     }
 
-    /// Executes the call of a file, `M98 (drill.tap) L2` of Mach3; returns false for other lines.
+    /// Executes the call of a file, `M98 (drill.tap) L2` of Mach3 and Haas; returns false for other lines.
     fn execute_call_of_file(&mut self) -> Outcome<bool> {
         let text = self.line.text.as_slice();
         let Some(rest) = text.strip_prefix(b"m98").filter(|rest| !rest.contains(&b'p')) else {

@@ -146,7 +146,8 @@ impl State {
             Some(0) => return Ok(()),
             Some(1 | 10 | 11 | 12 | 13) => return self.set_tool_data(block, level.unwrap_or_default()),
             Some(2 | 20) => {}
-            Some(level) if is_macro_b && (50..=52).contains(&level) => {
+            // Parameters, and lives of tools.
+            Some(level) if is_macro_b && matches!(level, 3 | 50..=52) => {
                 self.note_without_effect(format!("G10 L{level}"));
                 self.enters_parameters = true;
                 block.skip("ABCDEHIJKPQRUVWXYZ");

@@ -42,8 +42,8 @@ impl State {
         let Some(code) = codes.g.surface else { return Ok(()) };
         self.finish_contour()?;
         self.modal.surface = match code {
-            SurfaceCode::PolarOff => None,
-            SurfaceCode::Polar => {
+            SurfaceCode::PolarOff | SurfaceCode::PolarOff113 => None,
+            SurfaceCode::Polar | SurfaceCode::Polar112 => {
                 self.require_plain(code)?;
                 let start = self.programmed();
                 if start[0] < LEAST_RADIUS || !self.options.axes[5] {
@@ -51,7 +51,7 @@ impl State {
                 }
                 Some(Surface::Polar { base: start[5] })
             }
-            SurfaceCode::Cylinder => {
+            SurfaceCode::Cylinder | SurfaceCode::Cylinder107 => {
                 let word = (3..6).find_map(|axis| Some((axis, block.take(AXIS_LETTERS[axis])?)));
                 let (rotary, radius) = word.ok_or(
                     "G7.1 requires the rotary axis with the radius, as in G7.1 A50, or A0 at the end",
