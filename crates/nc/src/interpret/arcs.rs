@@ -34,6 +34,15 @@ impl State {
         let [first, second, _] = self.modal.plane.axes();
         let has_end = block.has_any(&[AXIS_LETTERS[first], AXIS_LETTERS[second]]) || block.polar != [None; 2];
         let (start, end) = (self.programmed(), self.targets(block)?);
+        if self.dialect == Dialect::Fanuc && block.get('R').is_some() {
+            // R comes before the center; without a distance to the end it is an arc of 0°.
+            block.skip("IJK");
+            let chord = (end[first] - start[first]).hypot(end[second] - start[second]);
+            if has_end && chord < POINT {
+                block.take('R');
+                return self.line_to(&end);
+            }
+        }
         let center = match block.take('R') {
             Some(_) if block.has_any(&CENTERS) => return Err("word R excludes I, J and K".to_owned()),
             Some(_) if !has_end => return Err("an arc with R requires an end point in its plane".to_owned()),

@@ -121,7 +121,7 @@ codes! {
         ToReference = 280 in ALL, "G28: moves to the first reference";
         StoreReference = 281 in NGC, "G28.1: stores the first reference";
         FromReference = 290 in FH, "G29: moves through the point of the last G28";
-        ToSecondReference = 300 in ALL, "G30: moves to the second reference";
+        ToSecondReference = 300 in ALL & !MARLIN, "G30: moves to the second reference";
         StoreSecondReference = 301 in NGC, "G30.1: stores the second reference";
         Shift = 520 in OTHERS, "G52: shifts all coordinate systems";
         MachineCoordinates = 530 in OTHERS, "G53: line in machine coordinates";
@@ -320,6 +320,7 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
 
 /// Codes that change the geometry and are known, with their remedies.
 const REMEDIES: &[(u16, &str)] = &[
+    (300, "a probing of the bed, which moves Z until it touches: remove it"),
     (71, "cylindrical interpolation: program the motions of the axes"),
     (121, "polar coordinate interpolation: program the motions of the axes"),
     (320, "threading on a lathe: no axis of the machine turns the workpiece"),

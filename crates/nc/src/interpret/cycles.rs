@@ -219,6 +219,11 @@ impl State {
         if is_linuxcnc && matches!(cycle.code, Motion::DwellDrilling | Motion::DwellBoring) {
             cycle.dwell.ok_or_else(|| format!("{name} requires P, the dwell in s"))?;
         }
+        if is_tapping(cycle.code) && block.get('Q').is_some_and(|peck| peck > 0.0) {
+            self.assume(format!(
+                "{name} Q: the pecks of tapping are not simulated, the thread is cut in one stroke"
+            ));
+        }
         if has_pecks(cycle.code) || !is_linuxcnc {
             cycle.peck =
                 block.take_rate('Q')?.filter(|peck| *peck > 0.0).map(|peck| peck * length).or(cycle.peck);

@@ -193,6 +193,12 @@ impl Modes {
     pub(super) fn tool_length(&self, state: &mut State) -> Outcome<f64> {
         let number = active_tool(state);
         let is_named = self.tool_names.values().any(|named| *named == number);
+        if self.edge > 1 {
+            state.assume(format!(
+                "D{}: the tool table has one cutting edge, its length and radius",
+                self.edge
+            ));
+        }
         match (self.edge, state.options.default_tool_length) {
             (0, _) => Ok(0.0),
             (_, Some(length)) if is_named => {

@@ -11,7 +11,10 @@ use crate::common::{error, steps};
 fn blocks_that_change_the_geometry_are_rejected_with_a_remedy() {
     let cases = [
         ("G1 X1", "feed missing"),
-        ("POCKET4(50,0,1,-5,10)", "POCKET4 is not supported: the cycle of a circular pocket is not simulated: post its motions"),
+        (
+            "POCKET4(50,0,1,-5,10)",
+            "POCKET4 is not supported: the cycle of a circular pocket is not simulated: post its motions",
+        ),
         ("G0 X1\nBSPLINE X2 Y3", "BSPLINE is not supported: post lines and arcs"),
         ("TRANSMIT", "TRANSMIT is not supported"),
         ("G147 X1", "G147 is not supported: post approach and retraction"),
