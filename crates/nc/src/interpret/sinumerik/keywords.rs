@@ -168,8 +168,6 @@ const ACCEPTED: &[&str] = &[
     "FZ",
     "STOLF",
     "DISC",
-    "DISR",
-    "DISCL",
     "SF",
     "LIMS",
     "SVC",
@@ -314,7 +312,7 @@ pub(super) fn is_executed_g(code: u32) -> bool {
     matches!(
         code,
         0..=4 | 9 | 17..=19 | 25 | 26 | 40..=42 | 53..=60 | 63 | 64 | 70 | 71 | 74 | 75 | 90 | 91 | 93..=97
-            | 110..=112 | 153 | 331 | 332 | 500 | 505..=599 | 641..=645 | 700 | 710 | 961 | 962 | 971..=973
+            | 110..=112 | 140 | 147 | 148 | 153 | 247 | 248 | 331 | 332 | 340 | 341 | 347 | 348 | 500 | 505..=599 | 641..=645 | 700 | 710 | 961 | 962 | 971..=973
     )
 }
 
@@ -335,9 +333,7 @@ pub(super) fn remedy(name: &str) -> Option<&'static str> {
 pub(super) fn g_remedy(code: u32) -> &'static str {
     match code {
         33..=35 | 335 | 336 => "threads are cut on a lathe: program G331 or CYCLE84",
-        140..=143 | 147 | 148 | 247 | 248 | 340 | 341 | 347 | 348 => {
-            "post approach and retraction as G1, G2 and G3"
-        }
+        141..=143 => "the side of the approach is that of the compensation: program G140",
         291 => "the ISO mode is read with --dialect fanuc: give the program without G290 and G291",
         5 | 7 => "inclined axes are not supported",
         _ => "no such G code of this control, or none for milling",
