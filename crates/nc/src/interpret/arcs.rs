@@ -25,13 +25,24 @@ const MAX_RADIUS_ERROR: f64 = 0.5 * MILLIMETER;
 impl State {
     /// Executes an arc.
     pub(super) fn arc(&mut self, block: &mut LineWords, is_clockwise: bool) -> Outcome<()> {
-        let turns = block.take('P').unwrap_or(1.0);
+        // P of Marlin are full circles before the arc.
+        let before = if self.dialect == Dialect::Marlin { 1.0 } else { 0.0 };
+        let turns = block.take('P').map_or(1.0, |turns| turns + before);
         if turns.fract() != 0.0 || !(1.0..=MAX_TURNS).contains(&turns) {
             return Err(format!("word P: {turns} turns, an integer from 1 to {MAX_TURNS} is required"));
         }
         let [first, second, _] = self.modal.plane.axes();
         let has_end = block.has_any(&[AXIS_LETTERS[first], AXIS_LETTERS[second]]) || block.polar != [None; 2];
         let (start, end) = (self.programmed(), self.targets(block)?);
+        if self.dialect == Dialect::Fanuc && block.get('R').is_some() {
+            // R comes before the center; without a distance to the end it is an arc of 0°.
+            block.skip("IJK");
+            let chord = (end[first] - start[first]).hypot(end[second] - start[second]);
+            if has_end && chord < POINT {
+                block.take('R');
+                return self.line_to(&end);
+            }
+        }
         let center = match block.take('R') {
             Some(_) if block.has_any(&CENTERS) => return Err("word R excludes I, J and K".to_owned()),
             Some(_) if !has_end => return Err("an arc with R requires an end point in its plane".to_owned()),
@@ -48,7 +59,7 @@ impl State {
     }
 
     /// Returns the center by I, J, K, m.
-    fn center_by_words(&self, block: &mut LineWords, start: &Coordinates) -> Outcome<[f64; 2]> {
+    pub(super) fn center_by_words(&self, block: &mut LineWords, start: &Coordinates) -> Outcome<[f64; 2]> {
         let [first, second, normal] = self.modal.plane.axes();
         let letters = [CENTERS[first], CENTERS[second]];
         // grbl does not read the third word; posts write it as 0.

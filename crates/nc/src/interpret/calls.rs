@@ -1,6 +1,7 @@
 //! Calls of subprograms and macros by number: M97, M98, M99, G65, G66, G67.
 
 use super::codes::{Action, Codes, ModalMacro, Subprogram};
+use super::dialect::Dialect;
 use super::error::Outcome;
 use super::line_words::LineWords;
 use super::parameters::LOCALS;
@@ -67,6 +68,12 @@ impl State {
         }
     }
 
+    /// Returns the number of calls of M98: word L, or Q of Mach3.
+    pub(super) fn repetitions_of_call(&self, block: &mut LineWords) -> Outcome<u32> {
+        let by_q = if self.dialect == Dialect::Mach3 { block.take_integer('Q')? } else { None };
+        Ok(block.take_integer('L')?.or(by_q).unwrap_or(1))
+    }
+
     /// Requests the call of a subprogram or the return from it: M97, M98, M99.
     pub(super) fn jump(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
         let Some(code) = codes.m.subprogram else { return Ok(()) };
@@ -74,7 +81,7 @@ impl State {
             Subprogram::Call => {
                 let number =
                     block.take_integer('P')?.ok_or("M98 requires P, the number of the subprogram")?;
-                Jump::Call { program: number, times: block.take_integer('L')?.unwrap_or(1) }
+                Jump::Call { program: number, times: self.repetitions_of_call(block)? }
             }
             Subprogram::Local => {
                 let number =

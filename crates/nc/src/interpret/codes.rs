@@ -121,7 +121,7 @@ codes! {
         ToReference = 280 in ALL, "G28: moves to the first reference";
         StoreReference = 281 in NGC, "G28.1: stores the first reference";
         FromReference = 290 in FH, "G29: moves through the point of the last G28";
-        ToSecondReference = 300 in ALL, "G30: moves to the second reference";
+        ToSecondReference = 300 in ALL & !MARLIN, "G30: moves to the second reference";
         StoreSecondReference = 301 in NGC, "G30.1: stores the second reference";
         Shift = 520 in OTHERS, "G52: shifts all coordinate systems";
         MachineCoordinates = 530 in OTHERS, "G53: line in machine coordinates";
@@ -202,6 +202,14 @@ codes! {
     exact_stop: ExactStop, "Exact stop of one line" {
         Line = 90 in FH | OKUMA, "G9";
     }
+    surface: SurfaceCode, "Interpolation on a surface" {
+        Cylinder = 71 in FANUC, "G7.1: cylindrical interpolation";
+        Polar = 121 in FANUC, "G12.1: polar coordinate interpolation";
+        PolarOff = 131 in FANUC, "G13.1: end of polar coordinate interpolation";
+        Cylinder107 = 1070 in FANUC, "G107: cylindrical interpolation";
+        Polar112 = 1120 in FANUC, "G112: polar coordinate interpolation";
+        PolarOff113 = 1130 in FANUC, "G113: end of polar coordinate interpolation";
+    }
     retraction: Retraction, "Retraction of canned cycles" {
         ToInitial = 980 in ALL, "G98: to the position before the cycle";
         ToPlane = 990 in ALL, "G99: to the plane R";
@@ -280,7 +288,7 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
     (80, FH | OKUMA, "P"),
     (54, FH, "Q"),
     (110, FH, ""),
-    (131, FH, ""),
+    (131, HAAS, ""),
     (220, FH | OKUMA, "XYZIJK"),
     (230, FH | OKUMA, ""),
     (250, FH, ""),
@@ -300,7 +308,7 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
     (970, GRBL, ""),
     (1030, HAAS, "P"),
     (1070, HAAS, ""),
-    (1130, FH, ""),
+    (1130, HAAS, ""),
     (1300, OKUMA, ""),
     (1310, OKUMA, "DEFIJKLPR"),
     (1320, OKUMA, "DEFIJKLPR"),
@@ -312,6 +320,7 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
 
 /// Codes that change the geometry and are known, with their remedies.
 const REMEDIES: &[(u16, &str)] = &[
+    (300, "a probing of the bed, which moves Z until it touches: remove it"),
     (71, "cylindrical interpolation: program the motions of the axes"),
     (121, "polar coordinate interpolation: program the motions of the axes"),
     (320, "threading on a lathe: no axis of the machine turns the workpiece"),
@@ -401,7 +410,7 @@ impl Codes {
                 continue;
             }
             match is_auxiliary(code, dialect) {
-                true => codes.without_effect.push((format!("M{code}"), "PQRSELIJK")),
+                true => codes.without_effect.push((format!("M{code}"), auxiliary_letters(dialect))),
                 false => codes.unsupported.push((format!("M{code}"), m_remedy(number))),
             }
         }
@@ -409,10 +418,17 @@ impl Codes {
     }
 }
 
+/// Returns the letters that belong to an auxiliary function. Settings of firmware have values for each axis.
+fn auxiliary_letters(dialect: Dialect) -> &'static str {
+    if dialect == Dialect::Marlin { "ABCDEFHIJKLOPQRSTUVWXYZ" } else { "PQRSELIJK" }
+}
+
 /// Returns true for an auxiliary function of a machine builder or user, which moves no axis.
 fn is_auxiliary(code: u32, dialect: Dialect) -> bool {
     let last = if dialect == Dialect::LinuxCnc { 199 } else { 9999 };
-    (10..=last).contains(&code) && !matches!(code, 96 | 97)
+    // M206, M218 and M290 of firmware shift the coordinates.
+    let shifts = dialect == Dialect::Marlin && matches!(code, 206 | 218 | 290);
+    (10..=last).contains(&code) && !matches!(code, 96 | 97) && !shifts
 }
 
 fn remedy(code: u16, dialect: Dialect) -> String {
@@ -435,6 +451,11 @@ fn remedy(code: u16, dialect: Dialect) -> String {
 
 fn m_remedy(code: u16) -> String {
     match MCodes::dialects(code) {
+        0 if matches!(code, 206 | 218 | 290) => {
+            format!(
+                "it shifts the coordinates: set a work offset in its place, or skip it with --ignore M{code}"
+            )
+        }
         0 => format!("skip it with --ignore M{code}"),
         _ => format!("known in --dialect haas; or skip it with --ignore M{code}"),
     }

@@ -97,6 +97,7 @@ impl State {
             dwell: None,
             peck: None,
             extra: [None; 3],
+            retraction_factor: None,
         });
         let levels = self.read_cycle(block, &mut cycle)?;
         let pecks = pecks(&cycle, levels.retract - levels.bottom, is_linuxcnc);
@@ -218,6 +219,11 @@ impl State {
         if is_linuxcnc && matches!(cycle.code, Motion::DwellDrilling | Motion::DwellBoring) {
             cycle.dwell.ok_or_else(|| format!("{name} requires P, the dwell in s"))?;
         }
+        if is_tapping(cycle.code) && block.get('Q').is_some_and(|peck| peck > 0.0) {
+            self.assume(format!(
+                "{name} Q: the pecks of tapping are not simulated, the thread is cut in one stroke"
+            ));
+        }
         if has_pecks(cycle.code) || !is_linuxcnc {
             cycle.peck =
                 block.take_rate('Q')?.filter(|peck| *peck > 0.0).map(|peck| peck * length).or(cycle.peck);
@@ -226,14 +232,15 @@ impl State {
             cycle.peck.ok_or_else(|| format!("{name} requires Q above 0, the depth of a peck"))?;
         }
         if !is_linuxcnc {
+            if is_tapping(cycle.code) && self.dialect == Dialect::Haas {
+                cycle.retraction_factor = block.take_rate('J')?.filter(|factor| *factor > 0.0);
+            }
             let last = if self.dialect == Dialect::Fanuc { 2 } else { 3 };
             for (extra, letter) in cycle.extra.iter_mut().zip(['I', 'J', 'K']).take(last) {
                 *extra = block.take(letter).map(|value| value * length).or(*extra);
             }
-            // Speed factor of tapping retraction.
             if is_tapping(cycle.code) {
-                block.take('J');
-                block.take('E');
+                block.skip("JE");
             }
         }
         Ok(Levels { retract, bottom, clear: retract })
@@ -267,10 +274,17 @@ impl State {
         match cycle.code {
             Motion::Boring | Motion::DwellBoring => self.feed_along(drill, levels.retract),
             code if is_tapping(code) => {
+                let (feed, speed) = (self.modal.feed, self.modal.spindle_speed);
+                let factor = cycle.retraction_factor.unwrap_or(1.0);
+                if self.modal.feed_mode == FeedMode::PerMinute {
+                    self.modal.feed = feed.map(|feed| feed.map(|feed| feed * factor));
+                }
+                self.modal.spindle_speed = speed * factor;
                 self.push_spindle(-1.0);
-                self.feed_along(drill, levels.retract)?;
+                let result = self.feed_along(drill, levels.retract);
+                (self.modal.feed, self.modal.spindle_speed) = (feed, speed);
                 self.push_spindle(1.0);
-                Ok(())
+                result
             }
             Motion::StopBoring | Motion::ManualBoring => {
                 self.push_spindle(0.0);

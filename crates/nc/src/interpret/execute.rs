@@ -72,6 +72,7 @@ impl State {
         if !codes.unsupported.is_empty() {
             block.skip(ALL_LETTERS);
         }
+        self.set_surface(block, &codes)?;
         self.set_frames(block, &codes)?;
         self.set_compensation(block, &codes)?;
         self.set_tool_length(block, &codes)?;

@@ -15,7 +15,7 @@ use crate::motion::{AXIS_LETTERS, Coordinates};
 const SCALING: usize = 0;
 const MIRROR: usize = 1;
 const ROTATION: usize = 2;
-/// Factor of a P without decimal point in G51 of Fanuc.
+/// Factor of a P without decimal point in G51 of Fanuc and Haas.
 const THOUSANDTH: f64 = 1e-3;
 /// Smallest integer that is a factor in thousandths.
 const LEAST_THOUSANDTHS: f64 = 50.0;
@@ -99,7 +99,8 @@ impl State {
         let mut factor = |letter: char| {
             let has_point = block.has_point(letter);
             let value = block.take(letter)?;
-            let is_integer = !has_point && self.dialect == Dialect::Fanuc && value.abs() >= LEAST_THOUSANDTHS;
+            let has_thousandths = matches!(self.dialect, Dialect::Fanuc | Dialect::Haas);
+            let is_integer = !has_point && has_thousandths && value.abs() >= LEAST_THOUSANDTHS;
             Some(if is_integer { value * THOUSANDTH } else { value })
         };
         let each = letters.map(&mut factor);

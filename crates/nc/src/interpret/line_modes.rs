@@ -35,6 +35,7 @@ impl State {
             && !matches!(self.dialect, Dialect::Sinumerik | Dialect::Okuma)
             && modal.feed_mode == FeedMode::PerMinute
             && modal.polar.is_none()
+            && modal.surface.is_none()
             && !modal.has_tool_vectors
             && !modal.is_machine
             && !self.moves_in_machine_coordinates

@@ -113,7 +113,9 @@ impl LineWords {
         let ignored = &state.options.ignored;
         let word = scanner.rest();
         let letter = scanner.take().unwrap_or_default();
-        if state.dialect != Dialect::LinuxCnc && b"xyzabc".contains(&letter) && scanner.has_no_value() {
+        // I of M3 and M5 in Marlin follows the motion.
+        let alone: &[u8] = if state.dialect == Dialect::Marlin { b"xyzabci" } else { b"xyzabc" };
+        if state.dialect != Dialect::LinuxCnc && alone.contains(&letter) && scanner.has_no_value() {
             // A letter alone, as in G28 X.
             self.given |= 1 << index(letter);
             return Ok(());
@@ -148,7 +150,14 @@ impl LineWords {
             b'n' if state.dialect == Dialect::LinuxCnc => {
                 return Err("word N: the line number stands at the start of the line".to_owned());
             }
-            b'o' => return Err(format!("{word}: an O-word stands at the start of the line")),
+            // O of M3 in Marlin is the power of a laser.
+            b'o' if state.dialect != Dialect::Marlin || self.m.is_empty() => {
+                return Err(format!("{word}: an O-word stands at the start of the line"));
+            }
+            // The position of an extruder that G92 sets.
+            b'e' if state.dialect == Dialect::Marlin && self.g.contains(&920) => {
+                self.given |= 1 << index(letter);
+            }
             // Analog outputs of LinuxCNC have the word E.
             b'e' if !state.dialect.has_macro_b() && !self.m.iter().any(|code| matches!(code, 66..=68)) => {
                 return Err(format!(

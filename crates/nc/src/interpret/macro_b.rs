@@ -27,7 +27,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
             return self.execute_okuma(statement).map(|()| true);
         }
         let text = &self.line.text;
-        if text.starts_with(b"if") {
+        if text.starts_with(b"if") || (text.starts_with(b"[") && self.state.dialect == Dialect::Haas) {
             self.execute_if()?;
         } else if text.starts_with(b"while") {
             let mut scanner = Scanner::new(text, &self.state);
@@ -94,7 +94,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
         Ok(times.unwrap_or(1))
     }
 
-    /// Executes `IF [condition] GOTO n` or `IF [condition] THEN words`.
+    /// Executes `IF [condition] GOTO n` or `IF [condition] THEN words`; Haas has THEN, and IF before M99, as options.
     fn execute_if(&mut self) -> Outcome<()> {
         let mut scanner = Scanner::new(&self.line.text, &self.state);
         scanner.skip("if");
@@ -103,7 +103,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
             let number = jump_target(&mut scanner)?;
             return if is_true { self.go_to(number) } else { Ok(()) };
         }
-        if !scanner.skip("then") {
+        if !scanner.skip("then") && self.state.dialect != Dialect::Haas {
             return Err(format!("{}: IF requires GOTO or THEN", scanner.found()));
         }
         if scanner.peek().is_none() {

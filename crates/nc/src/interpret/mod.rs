@@ -37,11 +37,13 @@ mod sinumerik;
 mod source;
 mod spline;
 mod state;
+mod surface;
 mod text;
 mod tools;
 mod work_offset;
 
 use std::io::{BufRead, Seek};
+use std::path::Path;
 
 use virtual_axes_core::text::escaped;
 
@@ -174,7 +176,29 @@ impl<R: BufRead + Seek> Interpreter<R> {
         if is_o_word(&self.line.text) && !self.state.dialect.has_macro_b() {
             return self.execute_o_word(place);
         }
+        if matches!(self.state.dialect, Dialect::Mach3 | Dialect::Haas) && self.execute_call_of_file()? {
+            return Ok(());
+        }
         self.execute_words(0)
+    }
+
+    /// Executes the call of a file, `M98 (drill.tap) L2` of Mach3 and Haas; returns false for other lines.
+    fn execute_call_of_file(&mut self) -> Outcome<bool> {
+        let text = self.line.text.as_slice();
+        let Some(rest) = text.strip_prefix(b"m98").filter(|rest| !rest.contains(&b'p')) else {
+            return Ok(false);
+        };
+        let raw = String::from_utf8_lossy(&self.line.raw).into_owned();
+        let name = raw.split_once('(').and_then(|(_, rest)| Some(rest.split_once(')')?.0.trim()));
+        let Some(name) = name.filter(|name| !name.is_empty()) else { return Ok(false) };
+        self.block.read(rest, &self.state)?;
+        let times = self.state.repetitions_of_call(&mut self.block)?;
+        self.block.require_used()?;
+        let stem = Path::new(name).file_stem().and_then(|stem| stem.to_str()).unwrap_or(name);
+        if times > 0 {
+            self.call(&stem.to_lowercase(), None, times)?;
+        }
+        Ok(true)
     }
 
     /// Executes a command of grbl (`$H`, `?`), or a message of firmware for printers and routers (`M117 Drill 2`, `M0 Put

@@ -19,7 +19,7 @@ use crate::motion::{
 /// Distance of each axis below which a straight motion is the rounding of no motion, m and rad.
 const STILL: f64 = 1e-12;
 /// Distance of the chords of an arc from it, where it is no circle in a plane of axes, m.
-const CHORD_ERROR: f64 = 0.2e-6;
+pub(super) const CHORD_ERROR: f64 = 0.2e-6;
 /// Largest number of chords of an arc.
 const MAX_CHORDS: f64 = 1e5;
 
@@ -56,6 +56,9 @@ impl State {
         }
         if !has_words && code != Motion::Nurbs {
             return Ok(());
+        }
+        if let Some(surface) = self.modal.surface {
+            return self.surface_motion(block, code, surface);
         }
         match code {
             // G0 of Marlin moves at the feed.
@@ -306,7 +309,7 @@ impl State {
         self.push_motion(kind, end, feed)
     }
 
-    fn push_motion(&mut self, kind: MotionKind, end: Coordinates, feed: Feed) -> Outcome<()> {
+    pub(super) fn push_motion(&mut self, kind: MotionKind, end: Coordinates, feed: Feed) -> Outcome<()> {
         for (axis, value) in end.into_iter().enumerate() {
             let (limit, unit) = if is_rotary(axis) { (MAX_ANGLE, "rad") } else { (MAX_LENGTH, "m") };
             if value.is_nan() || value.abs() > limit {
@@ -329,7 +332,7 @@ impl State {
     }
 
     /// Returns the feed of a motion to `end`; `is_line` if the end alone determines the moving axes.
-    fn feed(&self, end: &Coordinates, is_line: bool) -> Outcome<Feed> {
+    pub(super) fn feed(&self, end: &Coordinates, is_line: bool) -> Outcome<Feed> {
         let mode = self.modal.feed_mode;
         let Some([linear, rotary]) = self.modal.feed else {
             return Err(match mode {

@@ -1,5 +1,7 @@
 //! Offsets and references: G10, G28, G30, G40 to G44, G49, G52 to G59.3, G92.
 
+use virtual_axes_core::units::{MILLIMETER, Rounded};
+
 use super::codes::{
     Action, Codes, CoordinateSystem, CutterCompensation, KinematicsSwitch, ToolLength, g_name,
 };
@@ -144,7 +146,8 @@ impl State {
             Some(0) => return Ok(()),
             Some(1 | 10 | 11 | 12 | 13) => return self.set_tool_data(block, level.unwrap_or_default()),
             Some(2 | 20) => {}
-            Some(level) if is_macro_b && (50..=52).contains(&level) => {
+            // Parameters, and lives of tools.
+            Some(level) if is_macro_b && matches!(level, 3 | 50..=52) => {
                 self.note_without_effect(format!("G10 L{level}"));
                 self.enters_parameters = true;
                 block.skip("ABCDEHIJKPQRUVWXYZ");
@@ -260,7 +263,8 @@ impl State {
         let words = self.take_axes(block)?;
         if words.iter().all(Option::is_none) {
             // G92 S limits the speed of the spindle.
-            if self.dialect.has_macro_b() && code == Action::ShiftToPosition {
+            let is_spindle_limit = self.dialect.has_macro_b() && code == Action::ShiftToPosition;
+            if is_spindle_limit || block.was_given('E') {
                 return Ok(());
             }
             return Err(format!("{} requires at least one axis word", g_name(code.number())));
@@ -355,10 +359,13 @@ impl State {
         }
         let missing = || format!("tool {number} is not in the tool table");
         let length = self.options.default_tool_length.ok_or_else(missing)?;
-        // The length of the machine file is given; 0 is an assumption.
-        if length == 0.0 {
-            self.assume(format!("{}: length 0", missing()));
-        }
+        self.assume(match length {
+            0.0 => format!("{}: length 0", missing()),
+            _ => format!(
+                "tools without entry in the tool table have the tool length of the machine, {} mm",
+                Rounded(length / MILLIMETER)
+            ),
+        });
         Ok(length)
     }
 
@@ -386,6 +393,9 @@ impl State {
                     block.take('D').ok_or("G41.1 and G42.1 require D, the diameter of the tool")?;
                 block.skip("L");
                 0.5 * diameter * self.modal.length
+            }
+            Left | Right if self.dialect == Dialect::Mach3 && block.get('P').is_some() => {
+                block.take('P').unwrap_or_default() * self.modal.length
             }
             Left | Right => {
                 let mut number = block.take_integer('D')?;

@@ -17,7 +17,7 @@ const MAX_NAME: usize = 6;
 /// Prefix of the parameters of variables.
 pub(super) const PREFIX: &str = "_v_";
 /// Words of the graphics, the output and the control without effect on the motion, at the start of a line.
-const WITHOUT_EFFECT: [&[u8]; 7] = [b"draw", b"clear", b"def", b"nomsg", b"pset", b"put", b"write"];
+const WITHOUT_EFFECT: [&[u8]; 8] = [b"draw", b"clear", b"def", b"msg", b"nomsg", b"pset", b"put", b"write"];
 const FUNCTIONS: [&[u8]; 13] = [
     b"sin", b"cos", b"tan", b"asin", b"acos", b"atan", b"sqrt", b"abs", b"fix", b"fup", b"round", b"exp",
     b"ln",

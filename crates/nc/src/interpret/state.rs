@@ -15,6 +15,7 @@ use super::okuma;
 use super::options::InterpreterOptions;
 use super::parameters::{FIRST_OF_CONTROL, FIRST_VARIABLE_OF_CONTROL, LOCALS, ParameterValues};
 use super::report::{InterpretationReport, count};
+use super::surface::Surface;
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates, PathControl, Plane, ProgramStep, is_rotary};
 
 /// Distance below which an axis stays in its place, m and rad.
@@ -144,6 +145,8 @@ pub(super) struct Modal {
     pub plane_points: [Option<[Vector3<f64>; 2]>; 4],
     /// Programmed point of the last G28, m and rad.
     pub between: Coordinates,
+    /// Plane of the path that a rotary axis carries (G7.1, G12.1).
+    pub surface: Option<Surface>,
     /// True with constant surface speed (G96).
     pub has_surface_speed: bool,
     /// True if coordinates are axis positions (G15 H0 of Okuma).
@@ -168,6 +171,8 @@ pub(super) struct Cycle {
     pub peck: Option<f64>,
     /// Words I, J and K: first peck, its reduction and the least peck, or a lateral shift, m.
     pub extra: [Option<f64>; 3],
+    /// Factor of feed and speed on the way out of a thread (J of Haas).
+    pub retraction_factor: Option<f64>,
 }
 
 /// NURBS between G5.2 and G5.3.
@@ -204,6 +209,7 @@ impl State {
             frames: [CoordinateFrame::identity(); 3],
             plane_points: [None; 4],
             between: [0.0; AXIS_COUNT],
+            surface: None,
             has_surface_speed: false,
             is_machine: false,
             return_level: (ReturnLevel::Point, None),

@@ -65,6 +65,8 @@ impl LineText {
                     }
                 }
                 b'\'' if dialect == Dialect::Mach3 => break,
+                // Checksum of a host.
+                b'*' if dialect == Dialect::Marlin => break,
                 b':' if matches!(dialect, Dialect::Fanuc | Dialect::Haas) && self.text.is_empty() => {
                     self.text.push(b'o')
                 }

@@ -3,6 +3,7 @@
 mod arcs;
 mod canonical;
 mod common;
+mod dialects;
 mod extensions;
 mod fanuc;
 mod found;
@@ -14,5 +15,6 @@ mod properties;
 mod rejections;
 mod rs274;
 mod sinumerik;
+mod surface;
 mod survey;
 mod tool_center_point;

@@ -99,6 +99,7 @@ fn subprograms_stand_in_files_beside_the_program() {
     folder.file("O0020.nc", "%\nO0020 (SUB)\nG91 G0 Y1.\nG90\nM99\n%\n");
     folder.file("OBORE.SSB", "OBORE\nG0 X=PX\nX0\nRTS\n");
     folder.file("OO30.SSB", "OO30\nG0 Y=PY\nRTS\n");
+    folder.file("row.tap", "G91 G0 X1\nG90\nM99\n");
     folder.file("faulty.ngc", "o<faulty> sub\nG0 X1 Q7\no<faulty> endsub\n");
     let run = |text: &str, dialect: Dialect| -> Result<usize, String> {
         let options = InterpreterOptions {
@@ -113,6 +114,8 @@ fn subprograms_stand_in_files_beside_the_program() {
     assert_eq!(run("o<drill> call [5]\no<drill> call [7]\nG0 Y1\nM2\n", Dialect::LinuxCnc), Ok(6));
     assert_eq!(run("O1\nM98 P20 L3\nG0 X1.\nM30\n", Dialect::Fanuc), Ok(5));
     assert_eq!(run("$A.MIN%\nCALL OBORE PX=5\nCALL OO30 PY=4\nM2\n", Dialect::Okuma), Ok(4));
+    assert_eq!(run("M98 (row.tap) L3\nG0 Y1\nM30\n", Dialect::Mach3), Ok(5));
+    assert_eq!(run("O1\nM98 (/Memory/ROW.TAP)\nG0 Y1.\nM30\n", Dialect::Haas), Ok(3));
     let error = run("G0 X1\no<faulty> call\nM2\n", Dialect::LinuxCnc).expect_err("a fault");
     assert!(
         error.starts_with("part.nc:2: line 2 of the file of a subprogram: word Q has no effect"),

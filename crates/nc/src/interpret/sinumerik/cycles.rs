@@ -136,6 +136,9 @@ fn drill(cycle: &DrillingCycle, state: &mut State) -> Outcome<()> {
         }
         DrillingKind::FloatingTapping { pitch } => {
             if let Some(pitch) = pitch {
+                if state.modal.spindle_speed <= 0.0 {
+                    return Err("CYCLE840 with a pitch requires the spindle speed S".to_owned());
+                }
                 state.modal.feed_mode = FeedMode::PerMinute;
                 state.modal.feed = Some([pitch * state.modal.spindle_speed; 2]);
             }

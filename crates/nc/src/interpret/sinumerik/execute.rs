@@ -76,7 +76,20 @@ impl Sinumerik {
         self.set_transformation(words, state)?;
         self.set_coordinates(words, frame, state)?;
         self.set_path_control(words, state)?;
+        if let Some(code) = words.take_group(&[340, 341])? {
+            self.modes.approaches_in_space = code == 340;
+        }
+        words.take_g(140);
+        let soft = self.soft_path(words, state)?;
+        if let Some((path, false)) = &soft {
+            self.set_motion_mode(words)?;
+            self.retract_from_contour(path, words, state)?;
+        }
         self.set_compensation(words, state)?;
+        if let Some((path, true)) = soft {
+            self.set_motion_mode(words)?;
+            self.prepare_approach(path, words, state)?;
+        }
         self.move_axes(words, state, lines)?;
         self.finish(words, state, lines)
     }
@@ -265,6 +278,17 @@ impl Sinumerik {
         Ok(())
     }
 
+    fn set_motion_mode(&mut self, words: &mut Words) -> Outcome<()> {
+        self.modes.motion = match words.take_group(&[0, 1, 2, 3])? {
+            Some(0) => MotionMode::Rapid,
+            Some(1) => MotionMode::Line,
+            Some(2) => MotionMode::Clockwise,
+            Some(3) => MotionMode::Counterclockwise,
+            _ => self.modes.motion,
+        };
+        Ok(())
+    }
+
     /// Executes the motion of the block.
     fn move_axes(
         &mut self,
@@ -277,13 +301,7 @@ impl Sinumerik {
                 self.modes.motion = mode;
             }
         }
-        self.modes.motion = match words.take_group(&[0, 1, 2, 3])? {
-            Some(0) => MotionMode::Rapid,
-            Some(1) => MotionMode::Line,
-            Some(2) => MotionMode::Clockwise,
-            Some(3) => MotionMode::Counterclockwise,
-            _ => self.modes.motion,
-        };
+        self.set_motion_mode(words)?;
         let is_exact = words.take_g(9);
         let suppresses = words.take_group(&[53, 153])?.is_some() | words.take_keyword("SUPA");
         let suppression = if suppresses { Suppression::All } else { Suppression::None };
@@ -298,6 +316,9 @@ impl Sinumerik {
                     self.motion(words, Suppression::None, state)
                 }
             };
+        }
+        if let Some(rounding) = words.positive("RNDM", MAX_RATE)? {
+            self.modes.rounding = rounding * state.modal.length;
         }
         if !self.moves(words) {
             return Ok(());
@@ -346,6 +367,7 @@ impl Sinumerik {
         }
         self.reject_rest(words, state)?;
         if ends {
+            self.require_no_approach()?;
             return state.end();
         }
         if returns {

@@ -168,8 +168,6 @@ const ACCEPTED: &[&str] = &[
     "FZ",
     "STOLF",
     "DISC",
-    "DISR",
-    "DISCL",
     "SF",
     "LIMS",
     "SVC",
@@ -177,7 +175,6 @@ const ACCEPTED: &[&str] = &[
     "VELOLIM",
     "ACCLIM",
     "ATOL",
-    "FP",
     "PL",
     "SD",
     "SR",
@@ -272,15 +269,38 @@ const FRAMES: &str = "program TRANS, ROT or CYCLE800";
 const VECTORS: &str = "post the direction A3= B3= C3= at the end of each block";
 const MEASURING: &str = "remove the measurement, or skip it with /";
 
-/// Cycles of the control that are not simulated.
+/// Cycles of the control that are not simulated, beside those of `MILLING`.
 const CYCLES: &[&str] = &[
-    "CYCLE60", "CYCLE61", "CYCLE62", "CYCLE63", "CYCLE64", "CYCLE70", "CYCLE71", "CYCLE72", "CYCLE73",
-    "CYCLE74", "CYCLE75", "CYCLE76", "CYCLE77", "CYCLE78", "CYCLE79", "CYCLE90", "CYCLE899", "CYCLE830",
-    "CYCLE92", "CYCLE93", "CYCLE94", "CYCLE95", "CYCLE96", "CYCLE97", "CYCLE98", "CYCLE99", "CYCLE930",
-    "CYCLE940", "CYCLE951", "CYCLE952", "POCKET1", "POCKET2", "POCKET3", "POCKET4", "SLOT1", "SLOT2",
-    "LONGHOLE", "CYCLE961", "CYCLE971", "CYCLE976", "CYCLE977", "CYCLE978", "CYCLE979", "CYCLE982",
-    "CYCLE995", "CYCLE996", "CYCLE997", "CYCLE998",
+    "CYCLE73", "CYCLE74", "CYCLE75", "CYCLE830", "CYCLE92", "CYCLE93", "CYCLE94", "CYCLE95", "CYCLE96",
+    "CYCLE97", "CYCLE98", "CYCLE99", "CYCLE930", "CYCLE940", "CYCLE951", "CYCLE952", "CYCLE961", "CYCLE971",
+    "CYCLE976", "CYCLE977", "CYCLE978", "CYCLE979", "CYCLE982", "CYCLE995", "CYCLE996", "CYCLE997",
+    "CYCLE998",
 ];
+
+/// Declares milling cycles that are not simulated, with what they mill.
+macro_rules! milling {
+    ($($($name:literal)+ = $what:literal),+ $(,)?) => {
+        &[$($((
+            $name,
+            concat!($what, " is not simulated: post its motions as G1, G2 and G3"),
+        )),+),+]
+    };
+}
+
+const MILLING: &[(&str, &str)] = milling!(
+    "POCKET1" "POCKET3" = "the cycle of a rectangular pocket",
+    "POCKET2" "POCKET4" = "the cycle of a circular pocket",
+    "SLOT1" = "the cycle of slots on a circle",
+    "SLOT2" = "the cycle of circular slots",
+    "LONGHOLE" "CYCLE899" = "the cycle of slots",
+    "CYCLE61" "CYCLE71" = "the face milling cycle",
+    "CYCLE62" "CYCLE63" "CYCLE64" "CYCLE72" = "the cycle along a contour",
+    "CYCLE70" "CYCLE78" "CYCLE90" = "the thread milling cycle",
+    "CYCLE76" = "the cycle of a rectangular spigot",
+    "CYCLE77" = "the cycle of a circular spigot",
+    "CYCLE79" = "the cycle of a polygon",
+    "CYCLE60" = "the engraving cycle",
+);
 
 /// Returns true for a keyword, address or call without effect on the path.
 pub(super) fn is_accepted(name: &str) -> bool {
@@ -292,7 +312,7 @@ pub(super) fn is_executed_g(code: u32) -> bool {
     matches!(
         code,
         0..=4 | 9 | 17..=19 | 25 | 26 | 40..=42 | 53..=60 | 63 | 64 | 70 | 71 | 74 | 75 | 90 | 91 | 93..=97
-            | 110..=112 | 153 | 331 | 332 | 500 | 505..=599 | 641..=645 | 700 | 710 | 961 | 962 | 971..=973
+            | 110..=112 | 140 | 147 | 148 | 153 | 247 | 248 | 331 | 332 | 340 | 341 | 347 | 348 | 500 | 505..=599 | 641..=645 | 700 | 710 | 961 | 962 | 971..=973
     )
 }
 
@@ -305,14 +325,15 @@ pub(super) fn is_accepted_g(code: u32) -> bool {
 pub(super) fn remedy(name: &str) -> Option<&'static str> {
     let cycle =
         || CYCLES.contains(&name).then_some("the cycle is not simulated: post its motions as G1, G2 and G3");
-    REJECTED.iter().find(|(word, _)| *word == name).map(|(_, remedy)| *remedy).or_else(cycle)
+    let found = REJECTED.iter().chain(MILLING).find(|(word, _)| *word == name);
+    found.map(|(_, remedy)| *remedy).or_else(cycle)
 }
 
 /// Returns what to do in place of a G code that is not supported.
 pub(super) fn g_remedy(code: u32) -> &'static str {
     match code {
         33..=35 | 335 | 336 => "threads are cut on a lathe: program G331 or CYCLE84",
-        147 | 148 | 247 | 248 | 347 | 348 => "post approach and retraction as G1, G2 and G3",
+        141..=143 => "the side of the approach is that of the compensation: program G140",
         291 => "the ISO mode is read with --dialect fanuc: give the program without G290 and G291",
         5 | 7 => "inclined axes are not supported",
         _ => "no such G code of this control, or none for milling",

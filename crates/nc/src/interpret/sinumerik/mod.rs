@@ -30,6 +30,7 @@ mod patterns;
 mod procedure;
 mod scanner;
 mod sections;
+mod soft;
 mod statement;
 mod structures;
 mod system;
@@ -84,6 +85,8 @@ pub(super) struct Sinumerik {
     modal_call: Option<ModalCall>,
     /// ProgramUnit tangent at the end of the last motion in a plane.
     tangent: Option<(Plane, [f64; 2])>,
+    /// Approach that the next motion completes.
+    approach: Option<soft::SoftPath>,
     /// True if the block has polar coordinates.
     is_polar: bool,
     /// True behind the first statement of the program or subprogram.
@@ -110,6 +113,7 @@ impl Default for Sinumerik {
             missing: HashSet::new(),
             modal_call: None,
             tangent: None,
+            approach: None,
             is_polar: false,
             has_statement: false,
         }

@@ -121,6 +121,10 @@ pub(super) struct Modes {
     /// Modal rounding (RNDM), m.
     pub rounding: f64,
     pub orientation: OrientationMode,
+    /// Side of the tool with G41 and G42.
+    pub is_tool_left: Option<bool>,
+    /// True for G340: smooth approach and retraction with a helix, false for G341.
+    pub approaches_in_space: bool,
     /// Numbers of the tools without entry in the tool table, by name.
     pub tool_names: BTreeMap<String, u32>,
 }
@@ -142,6 +146,8 @@ impl Default for Modes {
             polar: [0.0; 2],
             rounding: 0.0,
             orientation: OrientationMode::default(),
+            is_tool_left: None,
+            approaches_in_space: true,
             tool_names: BTreeMap::new(),
         }
     }
@@ -193,6 +199,12 @@ impl Modes {
     pub(super) fn tool_length(&self, state: &mut State) -> Outcome<f64> {
         let number = active_tool(state);
         let is_named = self.tool_names.values().any(|named| *named == number);
+        if self.edge > 1 {
+            state.assume(format!(
+                "D{}: the tool table has one cutting edge, its length and radius",
+                self.edge
+            ));
+        }
         match (self.edge, state.options.default_tool_length) {
             (0, _) => Ok(0.0),
             (_, Some(length)) if is_named => {

@@ -44,11 +44,18 @@ impl Sinumerik {
     ) -> Outcome<()> {
         require_axes(words, state)?;
         if suppression == Suppression::All {
+            self.require_no_approach()?;
             return self.machine_motion(words, state);
         }
-        let start = state.programmed();
+        let approach = self.approach.take();
+        let start = approach.as_ref().map_or_else(|| state.programmed(), |path| path.point);
         let axis = self.tool_axis(words, state)?;
         let mut end = self.targets(words, &start, state)?;
+        if let Some(mut path) = approach.clone().filter(|path| !path.has_point) {
+            (path.point, path.has_point) = (end, true);
+            self.approach = Some(path);
+            return Ok(());
+        }
         if let Some(axis) = &axis {
             let rotary = self.rotary_axes(axis, state)?;
             (3..6).for_each(|index| end[index] = rotary[index] - state.origin(index));
@@ -64,6 +71,10 @@ impl Sinumerik {
                     complete_line(&start, &mut end, angle, state)?;
                 }
                 let is_rapid = mode == MotionMode::Rapid;
+                if let Some(path) = &approach {
+                    let tangent = direction(&start, &end, None, state);
+                    self.approach_contour(path, tangent, state)?;
+                }
                 match axis {
                     Some(axis) => self.line_with_vector(&end, &axis, is_rapid, state)?,
                     None if is_rapid => state.rapid_to(&end)?,
@@ -73,6 +84,10 @@ impl Sinumerik {
             }
             _ => {
                 let arc = self.circle(words, &start, &mut end, state)?;
+                if let Some(path) = &approach {
+                    let tangent = direction(&start, &end, arc.as_ref(), state);
+                    self.approach_contour(path, tangent, state)?;
+                }
                 self.note_tangent(&start, &end, arc.as_ref(), state);
                 match arc {
                     Some(arc) => state.arc_to(&arc, &end)?,
@@ -114,7 +129,12 @@ impl Sinumerik {
     }
 
     /// Returns the end of a motion by axis words or polar coordinates, which then count as used.
-    fn targets(&mut self, words: &mut Words, start: &Coordinates, state: &State) -> Outcome<Coordinates> {
+    pub(super) fn targets(
+        &mut self,
+        words: &mut Words,
+        start: &Coordinates,
+        state: &State,
+    ) -> Outcome<Coordinates> {
         let mut end = *start;
         for (axis, word) in words.axes.iter_mut().enumerate() {
             let Some((value, approach)) = word.take() else { continue };
@@ -170,9 +190,6 @@ impl Sinumerik {
             Ok(words.positive(name, MAX_RATE)?.map(|value| value * length))
         };
         let (round, chamfer, leg) = (take("RND")?, take("CHF")?, take("CHR")?);
-        if let Some(rounding) = take("RNDM")? {
-            self.modes.rounding = rounding;
-        }
         let modal = Some(self.modes.rounding);
         let corner = match (round, chamfer, leg) {
             (_, Some(length), _) => Some(length).filter(|size| *size > 0.0).map(Corner::ChamferLength),
@@ -228,6 +245,25 @@ impl Sinumerik {
         (state.modal.feed, state.modal.feed_mode) = (feed, mode);
         result
     }
+}
+
+/// Returns the tangent at the start of a line or arc in the plane.
+fn direction(
+    start: &Coordinates,
+    end: &Coordinates,
+    arc: Option<&PlanarArc>,
+    state: &State,
+) -> Option<[f64; 2]> {
+    let [first, second, _] = state.modal.plane.axes();
+    let [x, y] = match arc {
+        Some(arc) => {
+            let [x, y] = [start[first] - arc.center[0], start[second] - arc.center[1]];
+            [-y * arc.sweep.signum(), x * arc.sweep.signum()]
+        }
+        None => [end[first] - start[first], end[second] - start[second]],
+    };
+    let length = x.hypot(y);
+    (length > 1e-12).then(|| [x / length, y / length])
 }
 
 /// Rejects words of axes that the machine lacks.

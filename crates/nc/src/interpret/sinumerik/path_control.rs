@@ -48,8 +48,12 @@ impl Sinumerik {
         let offset = words.number("OFFN")?.map_or(0.0, |offset| offset * state.modal.length);
         match words.take_group(&[40, 41, 42])? {
             None => Ok(()),
-            Some(40) => state.compensate(None),
+            Some(40) => {
+                self.modes.is_tool_left = None;
+                state.compensate(None)
+            }
             Some(code) => {
+                self.modes.is_tool_left = Some(code == 41);
                 let known = state.options.tools.get(active_tool(state)).map(|tool| tool.radius);
                 if known.is_none() && self.modes.edge != 0 {
                     let tool = self.modes.tool_text(active_tool(state));

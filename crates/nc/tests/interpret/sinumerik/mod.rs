@@ -3,7 +3,7 @@
 mod cycles;
 mod flow;
 mod motions;
-mod orientation;
+pub mod orientation;
 mod posts;
 mod properties;
 mod rejections;

@@ -9,7 +9,7 @@ use virtual_axes_nc::motion::{MotionKind, ProgramMotion};
 use crate::common::{motions, steps};
 
 /// Returns a machine with pivots and workpiece off the machine zero.
-fn machine() -> MachineConfig {
+pub fn machine() -> MachineConfig {
     let mut parameters = Parameters::embedded_default().expect("the machine");
     let values = [
         ("kinematics.pivot_a_y_mm", "7.0"),

@@ -11,10 +11,13 @@ use crate::common::{error, steps};
 fn blocks_that_change_the_geometry_are_rejected_with_a_remedy() {
     let cases = [
         ("G1 X1", "feed missing"),
-        ("POCKET4(50,0,1,-5,10)", "POCKET4 is not supported: the cycle is not simulated: post its motions"),
+        (
+            "POCKET4(50,0,1,-5,10)",
+            "POCKET4 is not supported: the cycle of a circular pocket is not simulated: post its motions",
+        ),
         ("G0 X1\nBSPLINE X2 Y3", "BSPLINE is not supported: post lines and arcs"),
         ("TRANSMIT", "TRANSMIT is not supported"),
-        ("G147 X1", "G147 is not supported: post approach and retraction"),
+        ("G143 X1", "G143 is not supported: the side of the approach"),
         ("G291", "G291 is not supported: the ISO mode is read with --dialect fanuc"),
         ("CHANGE_TOOL(1)", "CHANGE_TOOL is not supported: neither a word of the control nor a subprogram"),
         ("G0 X=NOTHING", "NOTHING has no value: add DEF REAL NOTHING"),
@@ -67,7 +70,7 @@ fn native_programs_are_detected() {
 
 #[test]
 fn all_words_are_reported_at_once() {
-    let text = "N10 G0 X1\nN20 POCKET3(1,2,3)\nN30 BSPLINE\nN40 FFWON\nN50 G147 X5\nN60 POCKET3(4,5,6)\nN70 TOOL_HOME\nN80 G0 X=NOTHING\nN90 M30\n";
+    let text = "N10 G0 X1\nN20 POCKET3(1,2,3)\nN30 BSPLINE\nN40 FFWON\nN50 G141 X5\nN60 POCKET3(4,5,6)\nN70 TOOL_HOME\nN80 G0 X=NOTHING\nN90 M30\n";
     let options = InterpreterOptions { reports_all_errors: true, ..options() };
     let mut steps = Interpreter::new(Cursor::new(text), "part.mpf", options);
     let found: Vec<_> = steps.by_ref().collect();
@@ -79,7 +82,7 @@ fn all_words_are_reported_at_once() {
     let starts = [
         "POCKET3 is not supported",
         "BSPLINE is not supported",
-        "G147 is not supported",
+        "G141 is not supported",
         "TOOL_HOME is not supported",
         "NOTHING has no value",
     ];
