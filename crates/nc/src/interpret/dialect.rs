@@ -252,6 +252,8 @@ enum Pattern {
     Start(&'static str),
     /// Text in a comment of one of the first lines.
     Comment(&'static str),
+    /// Comment after two slashes.
+    Slashes,
     /// Number of a program or subprogram alone.
     ProgramNumber,
     /// O-word with a keyword or a name.
@@ -276,7 +278,7 @@ enum Pattern {
 
 use Pattern::{
     Assignment, Code, Command, Comment, CommonVariable, ConditionalLine, Head, HighAuxiliary, Homing, OWord,
-    Pair, ProgramNumber, Start, Word,
+    Pair, ProgramNumber, Slashes, Start, Word,
 };
 
 /// Evidence: dialects as bits, points, and the text.
@@ -395,6 +397,7 @@ const RULES: &[(u8, u32, Pattern)] = &[
     // Units and arc centers in a line, as posts of Vectric write them.
     (MACH3, 6, Code("G70G91.1")),
     (MACH3, 6, Code("G71G91.1")),
+    (MACH3, 6, Slashes),
     (MACH3, 6, Comment("MACH3")),
     (MACH3, 6, Comment("MACH2")),
     (MACH3, 6, Comment("MACH4")),
@@ -448,6 +451,7 @@ impl Pattern {
                 let is_comment = |at: usize| line[..at].contains(['(', ';']);
                 found(number <= COMMENT_LINES && line.find(text).is_some_and(is_comment), text)
             }
+            Slashes => found(line.trim_start().starts_with("//"), "a comment after //"),
             ProgramNumber => found(is_program_number(code), "the program number O"),
             OWord => found(is_o_word(code), "an O-word"),
             Assignment => found(has_assignment(code), "an assignment with ="),
@@ -469,9 +473,10 @@ impl Pattern {
 fn code_of(line: &str) -> String {
     let mut code = String::with_capacity(line.len());
     let mut depth = 0_u32;
-    for letter in line.chars() {
+    for (at, letter) in line.char_indices() {
         match letter {
             ';' if depth == 0 => break,
+            '/' if depth == 0 && line[at..].starts_with("//") => break,
             '(' => {
                 // The parenthesis of a call remains.
                 if depth == 0 && code.ends_with(|letter: char| letter.is_ascii_alphanumeric()) {
@@ -606,6 +611,7 @@ mod tests {
             ("N10G00G21G17G90G40G49G80\nN20G71G91.1\nN30T1M06\n", ("mach3", Some(2))),
             ("G20\nG70 G91.1\n", ("mach3", Some(2))),
             ("G20\nG91.1\n", ("linuxcnc", None)),
+            ("%\n//DATE=01-02-24 TIME=11:53\nG70\nG0 X1\n", ("mach3", Some(2))),
             ("$PART.MIN%\nG0 X1\n", ("okuma", Some(1))),
             ("O1001\nG15 H1\nG56 Z10. H1\n", ("okuma", Some(2))),
             ("G56 G43 H3 G0 X10\nM2\n", ("linuxcnc", None)),
