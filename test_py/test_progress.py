@@ -67,9 +67,9 @@ def test_a_long_program_has_a_bar_of_its_lines_on_a_terminal(raster: Path) -> No
         # `check` reads the program twice.
         steps_back = sum(before > after for (before, _), (after, _) in zip(shown, shown[1:]))
         assert steps_back <= (arguments[0] == "check"), arguments
-        assert re.sub(rb"note: .*\r\n", b"", found).endswith(CLEARED), found[-80:]
+        assert found.endswith(CLEARED), found[-80:]
 
 
 def test_no_progress_without_a_terminal(raster: Path) -> None:
     ended = subprocess.run([COMMAND, "check", raster], capture_output=True, timeout=120)
-    assert (ended.returncode, re.sub(rb"note: .*\n", b"", ended.stderr)) == (0, b"")
+    assert (ended.returncode, ended.stderr) == (0, b"")

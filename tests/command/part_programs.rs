@@ -23,11 +23,7 @@ fn checked(text: &str, arguments: &[&str]) -> Result<String, String> {
         [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
     match output.status.code() {
         Some(0) => Ok(out),
-        Some(2) if out.is_empty() => {
-            let is_error = |line: &&str| !line.starts_with("note: ");
-            let error: String = error.lines().filter(is_error).map(|line| format!("{line}\n")).collect();
-            Err(error.strip_prefix(&*file).expect("the file").to_owned())
-        }
+        Some(2) if out.is_empty() => Err(error.strip_prefix(&*file).expect("the file").to_owned()),
         status => panic!("{status:?}: {out}{error}"),
     }
 }

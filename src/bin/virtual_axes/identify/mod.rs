@@ -44,16 +44,17 @@ pub struct IdentifyArguments {
     /// each feedforward mode.
     #[arg(value_name = "RECORDING", required_unless_present = "transmission")]
     recordings: Vec<PathBuf>,
-    /// Recorded axis, several separated by commas, or `all`; without it the columns of the recordings are listed.
+    /// Recorded axis, several separated by commas, or `all`; without it the columns of the recordings are listed, unless
+    /// --new-machine is given.
     #[arg(long, value_name = "NAME[,…]|all")]
     axis: Option<String>,
     /// Initial machine: built-in machine or machine file. Values of a file, or of --set, are those that you state: results
     /// far from them are rejected.
     #[arg(long, default_value = DEFAULT_MACHINE)]
     machine: String,
-    /// Begin a new machine with this name in place of --machine: it has the recorded axes, travel and limits as recorded,
-    /// and a template for values that are neither recorded nor set by --set.
-    #[arg(long, value_name = "NAME", conflicts_with = "machine", requires = "axis")]
+    /// Begin a new machine with this name in place of --machine: it has the recorded axes, all of them without --axis,
+    /// travel and limits as recorded, and a template for values that are neither recorded nor set by --set.
+    #[arg(long, value_name = "NAME", conflicts_with = "machine")]
     new_machine: Option<String>,
     /// Set a parameter, for example `x.motor.torque_constant_nm_a=1.2`; can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -112,6 +113,11 @@ pub struct IdentifyArguments {
 }
 
 impl IdentifyArguments {
+    /// Returns the axes to identify, those of a new machine being all; none if the columns are listed.
+    fn axes(&self) -> Option<&str> {
+        self.axis.as_deref().or_else(|| self.new_machine.as_ref().map(|_| selection::ALL))
+    }
+
     /// Returns the recordings of the axis, without those for validation.
     fn listed(&self) -> Vec<PathBuf> {
         self.recordings.iter().chain(&self.transmission).cloned().collect()
@@ -130,7 +136,7 @@ struct Start {
 pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     check_listing(arguments)?;
     check_outputs(arguments)?;
-    let Some(axes) = &arguments.axis else { return listing(arguments) };
+    let Some(axes) = arguments.axes() else { return listing(arguments) };
     run_axes(arguments, axes).map_err(|error| {
         match error.is::<InvalidResult>()
             || !next_command::is_corrected(&error.to_string(), &arguments.reading)
@@ -249,7 +255,7 @@ fn start(arguments: &IdentifyArguments, axes: &str) -> Result<Start, Box<dyn Err
 
 /// Returns true if `--axis` names one axis.
 fn is_single(arguments: &IdentifyArguments) -> bool {
-    arguments.axis.as_deref().is_some_and(|axes| axes != selection::ALL && !axes.contains(','))
+    arguments.axes().is_some_and(|axes| axes != selection::ALL && !axes.contains(','))
 }
 
 /// Returns the values of an axis that the user has stated: those of a machine file and of `--set`, not those of a built-in
@@ -303,7 +309,7 @@ fn check_listing(arguments: &IdentifyArguments) -> Result<(), String> {
         ("--validate", !arguments.validate.is_empty()),
     ];
     let given: Vec<&str> = options.iter().filter(|(_, is_given)| *is_given).map(|(name, _)| *name).collect();
-    match (&arguments.axis, given.as_slice()) {
+    match (arguments.axes(), given.as_slice()) {
         (Some(_), _) | (None, []) => Ok(()),
         (None, given) => Err(format!(
             "{}: no effect without --axis, which lists the columns only; give --axis NAME or --axis all",
