@@ -470,7 +470,7 @@ impl Pattern {
 }
 
 /// Returns a line in upper case without blanks and comments.
-fn code_of(line: &str) -> String {
+pub(crate) fn code_of(line: &str) -> String {
     let mut code = String::with_capacity(line.len());
     let mut depth = 0_u32;
     for (at, letter) in line.char_indices() {
@@ -492,7 +492,8 @@ fn code_of(line: &str) -> String {
     code
 }
 
-fn has_word(code: &str, word: &str) -> bool {
+/// Returns true if a line in upper case without blanks has a word with its number.
+pub(crate) fn has_word(code: &str, word: &str) -> bool {
     code.match_indices(word).any(|(at, _)| {
         !code[at + word.len()..].starts_with(|next: char| next.is_ascii_digit() || next == '.')
             && !code[..at].ends_with(|before: char| before.is_ascii_alphabetic())

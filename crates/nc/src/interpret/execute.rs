@@ -262,17 +262,14 @@ impl State {
         let Some(value) = block.take_rate('P')? else {
             return if is_ngc { Ok(None) } else { Ok(Some(0.0)) };
         };
-        let is_ms = match self.dialect {
-            Dialect::Fanuc | Dialect::Haas => !has_point,
-            Dialect::Marlin => true,
-            _ => false,
-        };
+        let has_ms = matches!(self.dialect, Dialect::Fanuc | Dialect::Haas);
+        let is_ms = has_ms && !has_point || self.dialect == Dialect::Marlin;
         if is_ms && !self.has_given_dialect {
             self.assume(format!(
                 "dwell P is in ms, as in the dialect {}; in s it would be {value} s",
                 self.dialect
             ));
-        } else if !is_ms && value >= LONG_DWELL {
+        } else if !is_ms && !has_ms && value >= LONG_DWELL {
             self.assume(format!(
                 "dwell P{value} is {value} s, as in the dialect {}; in ms, as Fanuc has it, it would be {} s \
                  (--dialect fanuc)",

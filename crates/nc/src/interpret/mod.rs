@@ -48,6 +48,7 @@ use std::path::Path;
 use virtual_axes_core::text::escaped;
 
 pub use dialect::{DetectedDialect, Dialect, is_g_code};
+pub(crate) use dialect::{code_of, has_word};
 pub(crate) use encoding::read_line;
 pub use error::ProgramError;
 pub use ignored::{CodePattern, IgnoredCodes};

@@ -359,13 +359,15 @@ impl State {
         }
         let missing = || format!("tool {number} is not in the tool table");
         let length = self.options.default_tool_length.ok_or_else(missing)?;
-        self.assume(match length {
-            0.0 => format!("{}: length 0", missing()),
-            _ => format!(
+        if length == 0.0 {
+            self.assume(format!("{}: length 0", missing()));
+        } else if self.dialect != Dialect::LinuxCnc {
+            // These controls have lengths in memory, not in a file beside the program.
+            self.assume(format!(
                 "tools without entry in the tool table have the tool length of the machine, {} mm",
                 Rounded(length / MILLIMETER)
-            ),
-        });
+            ));
+        }
         Ok(length)
     }
 

@@ -8,6 +8,7 @@ use virtual_axes_core::machine::Machine;
 use virtual_axes_core::text::cut;
 use virtual_axes_core::units::seconds;
 
+use crate::interpret::{code_of, has_word};
 use crate::plan::ProgramActivity;
 
 /// Largest number of comments that begin an operation; the last operation has the rest of the program.
@@ -162,7 +163,10 @@ impl OperationMeter {
     /// Adds the time of a position cycle with the activity at its setpoint; `comments` are those of the program.
     pub fn add_time(&mut self, comments: &[(usize, String)], activity: ProgramActivity) {
         let ProgramActivity { kind, line, tool } = activity;
-        let key = (comments.partition_point(|(start, _)| *start <= line), tool);
+        let before = comments.partition_point(|(start, _)| *start <= line);
+        let is_called = before > 0 && comments[before - 1].1.is_empty();
+        let calling = || self.operations.get(self.last).map_or(0, |((comment, _), _)| *comment);
+        let key = (if is_called { calling() } else { before }, tool);
         let is_first = self.operations.is_empty();
         if self.operations.get(self.last).is_none_or(|(last, _)| *last != key) {
             let known = self.operations.iter().position(|(other, _)| *other == key);
@@ -250,7 +254,8 @@ impl OperationMeter {
 }
 
 /// Returns lines that are a comment alone, with their texts, from 1: `( )`, from `;` on, or `MSG("")`. Of comments in a
-/// row the last one counts.
+/// row the last one counts. Lines at which a subprogram begins or ends have no text: what follows them belongs to the
+/// operation that calls it.
 ///
 /// # Errors
 ///
@@ -259,7 +264,10 @@ pub(super) fn comment_lines(program: impl BufRead) -> io::Result<Vec<(usize, Str
     let mut found: Vec<(usize, String)> = Vec::new();
     for (index, line) in program.split(b'\n').enumerate() {
         let line = line?;
-        let Some(text) = comment(&String::from_utf8_lossy(&line)) else { continue };
+        let line = String::from_utf8_lossy(&line);
+        let Some(text) = comment(&line).or_else(|| is_program_boundary(&line).then(String::new)) else {
+            continue;
+        };
         if found.last().is_some_and(|(last, _)| *last == index) {
             found.pop();
         }
@@ -269,6 +277,21 @@ pub(super) fn comment_lines(program: impl BufRead) -> io::Result<Vec<(usize, Str
         found.push((index + 1, text));
     }
     Ok(found)
+}
+
+/// Returns true for a line at which a program or subprogram begins or ends.
+fn is_program_boundary(line: &str) -> bool {
+    let code = code_of(&line.to_uppercase());
+    let code = code.trim_end_matches('(');
+    let rest = match code.strip_prefix("O<") {
+        Some(rest) => rest.split_once('>').map(|(_, rest)| rest),
+        None => {
+            code.strip_prefix(['O', ':']).map(|rest| rest.trim_start_matches(|c: char| c.is_ascii_digit()))
+        }
+    };
+    let begins = rest.is_some_and(|rest| matches!(rest, "" | "SUB" | "ENDSUB"));
+    let ends = ["M2", "M02", "M30", "M99", "M17", "RET"];
+    begins || code.starts_with("%_N_") || ends.iter().any(|end| has_word(code, end))
 }
 
 /// Returns the text of a line that is a comment alone.
@@ -294,7 +317,15 @@ mod tests {
                     N20 MSG(\"Bore\")\n()\n";
         let found = comment_lines(text.as_bytes()).unwrap();
         let expected = [(4, "2D Contour1"), (9, "Drill"), (11, "Bore")];
+        let found: Vec<_> = found.into_iter().filter(|(_, text)| !text.is_empty()).collect();
         assert_eq!(found, expected.map(|(line, text)| (line, text.to_owned())));
+        let text = "O1\n(FIRST)\nM98 P100\nM30\nO100 (PATH)\nG1 X1\nM99\n(LAST)\n\no<hole> sub\no<hole> call\n%_N_A_SPF\n";
+        let lines: Vec<(usize, bool)> = comment_lines(text.as_bytes())
+            .unwrap()
+            .iter()
+            .map(|(line, text)| (*line, text.is_empty()))
+            .collect();
+        assert_eq!(lines, [(2, false), (5, true), (8, false), (10, true), (12, true)]);
         let long = format!("({})", "ä".repeat(61));
         assert_eq!(comment(&long), Some("ä".repeat(60) + "…"));
         assert_eq!(comment(&long.replacen('ä', "", 1)), Some("ä".repeat(60)));

@@ -151,12 +151,17 @@ impl Sinumerik {
         }
         state.modal.feed_mode = mode;
         if let Some(feed) = words.positive("F", MAX_RATE)? {
-            let units =
-                if mode == FeedMode::InverseTime { [1.0; 2] } else { [self.modes.feed_length, DEGREE] };
-            state.modal.feed_word = feed;
-            state.modal.feed = (feed > 0.0).then(|| units.map(|unit| feed * unit));
+            self.apply_feed(feed, state);
         }
         Ok(())
+    }
+
+    /// Sets the feed of a word.
+    fn apply_feed(&self, feed: f64, state: &mut State) {
+        let is_inverse = state.modal.feed_mode == FeedMode::InverseTime;
+        let units = if is_inverse { [1.0; 2] } else { [self.modes.feed_length, DEGREE] };
+        state.modal.feed_word = feed;
+        state.modal.feed = (feed > 0.0).then(|| units.map(|unit| feed * unit));
     }
 
     fn set_spindle(&mut self, words: &mut Words, state: &mut State) -> Outcome<()> {
@@ -320,6 +325,7 @@ impl Sinumerik {
         if let Some(rounding) = words.positive("RNDM", MAX_RATE)? {
             self.modes.rounding = rounding * state.modal.length;
         }
+        let block_feed = words.positive("FB", MAX_RATE)?.filter(|feed| *feed > 0.0);
         if !self.moves(words) {
             return Ok(());
         }
@@ -327,8 +333,13 @@ impl Sinumerik {
         if is_exact {
             state.modal.path_control = PathControl::ExactStop;
         }
+        let feed = (state.modal.feed_word, state.modal.feed);
+        if let Some(block_feed) = block_feed {
+            self.apply_feed(block_feed, state);
+        }
         let result = self.motion(words, suppression, state);
         state.modal.path_control = path_control;
+        (state.modal.feed_word, state.modal.feed) = feed;
         result?;
         if suppression == Suppression::All { Ok(()) } else { self.repeat_modal_call(state, lines) }
     }

@@ -162,7 +162,6 @@ const ACCEPTED: &[&str] = &[
     "JERKLIM",
     "FL",
     "FA",
-    "FB",
     "FRC",
     "FRCM",
     "FZ",

@@ -15,10 +15,10 @@ use super::{Sinumerik, keywords};
 use crate::motion::ProgramEvent;
 
 /// Addresses of several letters that have a meaning here or a remedy.
-const ADDRESSES: [&str; 41] = [
+const ADDRESSES: [&str; 42] = [
     "CR", "AR", "AP", "RP", "RPL", "TURN", "RND", "RNDM", "CHF", "CHR", "ANG", "ADIS", "ADISPOS", "CTOL",
     "OTOL", "OFFN", "A2", "B2", "C2", "A3", "B3", "C3", "A4", "B4", "C4", "A5", "B5", "C5", "I1", "J1", "K1",
-    "LEAD", "TILT", "THETA", "A6", "B6", "C6", "FP", "DISR", "DISCL", "FAD",
+    "LEAD", "TILT", "THETA", "A6", "B6", "C6", "FB", "FP", "DISR", "DISCL", "FAD",
 ];
 
 /// Returns true for a letter with digits, which is no name of a subprogram: `M30`, not `L30`.
