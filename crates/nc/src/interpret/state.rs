@@ -15,8 +15,16 @@ use super::okuma;
 use super::options::InterpreterOptions;
 use super::parameters::{FIRST_OF_CONTROL, FIRST_VARIABLE_OF_CONTROL, LOCALS, ParameterValues};
 use super::report::{InterpretationReport, count};
-use super::surface::Surface;
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates, PathControl, Plane, ProgramStep, is_rotary};
+
+/// Plane of the path that a rotary axis carries.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Surface {
+    /// Cylinder about a rotary axis with a radius, m; words of the rotary axis are angles.
+    Cylinder { rotary: usize, radius: f64 },
+    /// Plane normal to C: words of C are lengths. X lies along the axis X with C at the angle `base`, rad.
+    Polar { base: f64 },
+}
 
 /// Distance below which an axis stays in its place, m and rad.
 const ROUNDING: f64 = 1e-13;

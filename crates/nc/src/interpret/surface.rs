@@ -9,7 +9,7 @@ use super::codes::{Codes, Motion, SurfaceCode, g_name};
 use super::error::Outcome;
 use super::line_words::LineWords;
 use super::moves::CHORD_ERROR;
-use super::state::State;
+use super::state::{State, Surface};
 use crate::motion::{AXIS_LETTERS, Coordinates, Feed, MotionKind, Plane};
 
 /// Parts of an arc that are divided further.
@@ -18,15 +18,6 @@ const PARTS: u32 = 16;
 const MAX_DEPTH: u32 = 16;
 /// Smallest distance from the center of polar coordinates, m.
 const LEAST_RADIUS: f64 = 1e-6;
-
-/// Plane of the path.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Surface {
-    /// Cylinder about a rotary axis with a radius, m; words of the rotary axis are angles.
-    Cylinder { rotary: usize, radius: f64 },
-    /// Plane normal to C: words of C are lengths. X lies along the axis X with C at the angle `base`, rad.
-    Polar { base: f64 },
-}
 
 /// Path in the plane: programmed coordinates by the share of its length.
 struct SurfacePath<'a> {

@@ -31,6 +31,7 @@ mod procedure;
 mod scanner;
 mod sections;
 mod soft;
+mod soft_path;
 mod statement;
 mod structures;
 mod system;
@@ -86,7 +87,7 @@ pub(super) struct Sinumerik {
     /// ProgramUnit tangent at the end of the last motion in a plane.
     tangent: Option<(Plane, [f64; 2])>,
     /// Approach that the next motion completes.
-    approach: Option<soft::SoftPath>,
+    approach: Option<soft_path::SoftPath>,
     /// True if the block has polar coordinates.
     is_polar: bool,
     /// True behind the first statement of the program or subprogram.

@@ -1,77 +1,17 @@
 //! Smooth approach and retraction: G147, G247, G347 to a contour with cutter radius compensation, and G148, G248, G348 from
 //! it, on a straight line, a quarter circle or a semicircle of the tool center that is tangent to the contour.
 
-use std::f64::consts::{FRAC_PI_2, PI};
-
 use super::super::error::Outcome;
 use super::super::limits::MAX_RATE;
 use super::super::state::State;
 use super::Sinumerik;
 use super::modes::MotionMode;
+use super::soft_path::{Beside, Shape, SoftPath};
 use super::words::{Approach, Words};
 use crate::motion::{AXIS_LETTERS, Coordinates, PlanarArc};
 
 /// G codes of approach and retraction.
 const CODES: [u32; 6] = [147, 148, 247, 248, 347, 348];
-
-/// Shape of the path at the contour.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Shape {
-    Line,
-    Quarter,
-    Semicircle,
-}
-
-/// Values of a block, m.
-#[derive(Debug, Clone)]
-pub(super) struct SoftPath {
-    shape: Shape,
-    /// DISR: distance of the cutter from the contour, or radius of the tool center's circle.
-    distance: f64,
-    /// Level DISCL along the normal of the plane, where rapid traverse ends; `None` at the level of the contour.
-    level: Option<f64>,
-    /// FAD: feed of the infeed, m/min.
-    infeed: Option<f64>,
-    /// True if rapid traverse leads to the path.
-    is_rapid: bool,
-    /// Start of the contour.
-    pub point: Coordinates,
-    /// True if the coordinates of the plane are known; otherwise they are those of the next motion.
-    pub has_point: bool,
-}
-
-/// Path beside the contour, whose parallel is that of the tool center.
-struct Beside {
-    /// Other end of the path along the axes of the plane, m.
-    end: [f64; 2],
-    /// Center and angle of the circle.
-    arc: Option<([f64; 2], f64)>,
-}
-
-impl SoftPath {
-    /// Returns the path beside the contour at a point with the tangent of the contour; `forward` is 1 behind the contour and
-    /// −1 in front of it.
-    fn beside(&self, point: [f64; 2], tangent: [f64; 2], forward: f64, (side, radius): (f64, f64)) -> Beside {
-        let along = |length: f64, across: f64| {
-            [
-                point[0] + length * tangent[0] - across * tangent[1],
-                point[1] + length * tangent[1] + across * tangent[0],
-            ]
-        };
-        // The parallel of the circle has the radius DISR.
-        let size = self.distance + radius;
-        let center = along(0.0, side * size);
-        match self.shape {
-            Shape::Line => Beside { end: along(forward * size, 0.0), arc: None },
-            Shape::Quarter => {
-                Beside { end: along(forward * size, side * size), arc: Some((center, side * FRAC_PI_2)) }
-            }
-            Shape::Semicircle => {
-                Beside { end: along(0.0, 2.0 * side * size), arc: Some((center, side * PI)) }
-            }
-        }
-    }
-}
 
 impl Sinumerik {
     /// Returns the values of G147 to G348 in a block, which then count as used, with true for an approach.
