@@ -6,7 +6,7 @@ use super::super::limits::MAX_RATE;
 use super::super::state::State;
 use super::Sinumerik;
 use super::modes::MotionMode;
-use super::soft_path::{Beside, Shape, SoftPath};
+use super::soft_path::{Beside, SoftPath, SoftShape};
 use super::words::{Approach, Words};
 use crate::motion::{AXIS_LETTERS, Coordinates, PlanarArc};
 
@@ -43,9 +43,9 @@ impl Sinumerik {
             }
         };
         let shape = match code / 100 {
-            1 => Shape::Line,
-            2 => Shape::Quarter,
-            _ => Shape::Semicircle,
+            1 => SoftShape::Line,
+            2 => SoftShape::Quarter,
+            _ => SoftShape::Semicircle,
         };
         let path = SoftPath { shape, distance, level, infeed, is_rapid: false, point, has_point: false };
         Ok(Some((path, is_approach)))

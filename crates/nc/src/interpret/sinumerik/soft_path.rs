@@ -6,7 +6,7 @@ use crate::motion::Coordinates;
 
 /// Shape of the path at the contour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Shape {
+pub(super) enum SoftShape {
     Line,
     Quarter,
     Semicircle,
@@ -15,7 +15,7 @@ pub(super) enum Shape {
 /// Values of a block, m.
 #[derive(Debug, Clone)]
 pub(super) struct SoftPath {
-    pub shape: Shape,
+    pub shape: SoftShape,
     /// DISR: distance of the cutter from the contour, or radius of the tool center's circle.
     pub distance: f64,
     /// Level DISCL along the normal of the plane, where rapid traverse ends; `None` at the level of the contour.
@@ -58,11 +58,11 @@ impl SoftPath {
         let size = self.distance + radius;
         let center = along(0.0, side * size);
         match self.shape {
-            Shape::Line => Beside { end: along(forward * size, 0.0), arc: None },
-            Shape::Quarter => {
+            SoftShape::Line => Beside { end: along(forward * size, 0.0), arc: None },
+            SoftShape::Quarter => {
                 Beside { end: along(forward * size, side * size), arc: Some((center, side * FRAC_PI_2)) }
             }
-            Shape::Semicircle => {
+            SoftShape::Semicircle => {
                 Beside { end: along(0.0, 2.0 * side * size), arc: Some((center, side * PI)) }
             }
         }
