@@ -1,6 +1,6 @@
 //! Survey of a part program: its interpretation as a whole, without planning. All errors, motions and extents at once.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig};
@@ -54,6 +54,8 @@ pub struct ProgramSurvey {
     first_excess: Option<(usize, String)>,
     /// Axis positions at programmed coordinate 0 of each system at the end, m and rad.
     work_offsets: BTreeMap<usize, [f64; AXIS_COUNT]>,
+    /// Work offsets that the program sets.
+    set_work_offsets: BTreeSet<usize>,
     has_tool_center_point: bool,
 }
 
@@ -77,6 +79,7 @@ impl ProgramSurvey {
             subprogram_folder: program_folder(name, builtin),
             ..options.interpreter(machine).map_err(|error| format!("{name}: {error}"))?
         };
+        let given = options.work_offsets.clone();
         let transform = TipTransform::new(machine);
         let start = transform.joints(&options.start, None);
         let mut steps = Interpreter::new(source, &escaped(name), options);
@@ -97,6 +100,7 @@ impl ProgramSurvey {
             ranges,
             first_excess: None,
             work_offsets: BTreeMap::new(),
+            set_work_offsets: BTreeSet::new(),
             has_tool_center_point: false,
         };
         let mut failure = None;
@@ -108,6 +112,9 @@ impl ProgramSurvey {
                     survey.add(&motion, &transform, machine, system.map(|(index, _)| index));
                     if let Some((index, offset)) = system {
                         survey.work_offsets.insert(index, offset);
+                        if given.get(index) != Some(&offset) {
+                            survey.set_work_offsets.insert(index);
+                        }
                     }
                 }
                 Ok(ProgramStep::Event {
@@ -243,7 +250,7 @@ impl ProgramSurvey {
     /// Returns the work offset of an axis with which a range is within the travel limits.
     fn fit(&self, system: Option<usize>, axis: &AxisConfig, [low, high]: [f64; 2]) -> String {
         let Some(system) = system else {
-            return "machine coordinates (G53, G28): change the program".to_owned();
+            return "machine coordinates (G53), or the point of G28 or G30: change the program".to_owned();
         };
         let (name, limits) = (system_name(system), axis.limits());
         if high - low > limits.travel_max - limits.travel_min + ROUNDING {
@@ -258,7 +265,12 @@ impl ProgramSurvey {
         let offset = self.work_offsets.get(&system).map_or(0.0, |offset| offset[index]);
         let [least, most] = [limits.travel_min - low, limits.travel_max - high]
             .map(|shift| Position(axis, offset + shift).to_string());
-        format!("{name} {}: {least} to {most} (now {})", AXIS_LETTERS[index], Position(axis, offset))
+        let letter = AXIS_LETTERS[index];
+        let fit = format!("{name} {letter}: {least} to {most} (now {})", Position(axis, offset));
+        match self.set_work_offsets.contains(&system) {
+            true => fit + ", which the program sets by G10: change it there",
+            false => fit,
+        }
     }
 }
 

@@ -87,9 +87,14 @@ fn travel_excess_names_the_work_offset_that_fits() {
     assert_eq!(page(&folder, text, &PartProgramOptions { work_offsets, ..options.clone() }), None);
     let machine_coordinates = page(&folder, "G53 G0 Y-300\nM2\n", &options).expect("beyond the travel");
     assert!(
-        machine_coordinates.contains("machine coordinates (G53, G28): change the program"),
+        machine_coordinates
+            .contains("machine coordinates (G53), or the point of G28 or G30: change the program"),
         "{machine_coordinates}"
     );
+    // The offset of the program takes effect in place of a given one.
+    let set =
+        page(&folder, "G10 L2 P1 Y-300\nG54 G0 X10\nG1 F100 Y1\nM2\n", &options).expect("beyond the travel");
+    assert!(set.contains("(now -300 mm), which the program sets by G10: change it there"), "{set}");
 }
 
 #[test]
