@@ -8,7 +8,7 @@ use std::fmt;
 
 /// Meters in a millimeter.
 pub const MILLIMETER: f64 = 1e-3;
-/// Inch in m.
+/// Meters in an inch.
 pub const INCH: f64 = 25.4 * MILLIMETER;
 /// Meters in a micrometer.
 pub const MICROMETER: f64 = 1e-6;

@@ -1,7 +1,7 @@
 //! Execution of one line, in the order of LinuxCNC: feed, spindle, tool, coolant, dwell, plane, units, cutter compensation,
 //! tool length, coordinate system, path control, distance mode, motion, stop.
 
-use virtual_axes_core::units::{DEGREE, MILLIMETER, RPM};
+use virtual_axes_core::units::{DEGREE, INCH, MILLIMETER, MILLISECOND, RPM};
 
 use super::codes::{
     Action, ArcDistance, Codes, Coolant, Distance, FeedMode, Motion, PathControlCode, PlaneCode, Retraction,
@@ -16,12 +16,8 @@ use super::parameters::{FIRST_OF_CONTROL, FIRST_VARIABLE_OF_CONTROL};
 use super::state::{Modal, State};
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Blend, PathControl, Plane, ProgramEvent};
 
-/// Millimeters in an inch.
-const INCH: f64 = 25.4 * MILLIMETER;
 /// Dwell from which the other unit of P is likely, s.
 const LONG_DWELL: f64 = 100.0;
-/// Milliseconds in a second.
-const MILLISECOND: f64 = 1e-3;
 /// Letters that belong to codes which are not supported.
 const ALL_LETTERS: &str = "ABCDEHIJKLPQRUVWXYZ";
 

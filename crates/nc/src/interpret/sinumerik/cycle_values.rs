@@ -1,6 +1,6 @@
 //! Values of cycles, and the motions that cycles are made of.
 
-use virtual_axes_core::units::MILLIMETER;
+use virtual_axes_core::units::{INCH, MILLIMETER};
 
 use super::super::error::Outcome;
 use super::super::limits::MAX_RATE;
@@ -93,8 +93,8 @@ impl CycleValues<'_> {
         if let Some(pitch) = self.get(pitch)?.map(f64::abs).filter(|pitch| *pitch > 0.0) {
             return Ok(Some(match unit as i32 {
                 1 => pitch * MILLIMETER,
-                2 => 25.4 * MILLIMETER / pitch,
-                3 => pitch * 25.4 * MILLIMETER,
+                2 => INCH / pitch,
+                3 => pitch * INCH,
                 4 => pitch * std::f64::consts::PI * MILLIMETER,
                 _ => pitch * self.length,
             }));

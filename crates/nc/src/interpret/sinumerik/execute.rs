@@ -1,6 +1,6 @@
 //! Execution of the words of one block: modes, tool and spindle, frames, then the motion, then stops.
 
-use virtual_axes_core::units::{DEGREE, MILLIMETER, RPM};
+use virtual_axes_core::units::{DEGREE, INCH, MILLIMETER, RPM};
 
 use super::super::codes::FeedMode;
 use super::super::error::Outcome;
@@ -16,9 +16,6 @@ use super::value::ProgramValue;
 use super::words::Words;
 use super::{Sinumerik, keywords};
 use crate::motion::{AXIS_COUNT, PathControl, Plane, ProgramEvent};
-
-/// Millimeters in an inch.
-const INCH: f64 = 25.4 * MILLIMETER;
 
 /// Counts a word without effect on the path.
 pub(super) fn accept(name: &str, state: &mut State) {
