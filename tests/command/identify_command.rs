@@ -4,7 +4,7 @@ use std::process::{Command, Stdio};
 use std::sync::LazyLock;
 use std::time::Duration;
 
-use crate::command_common::{assert_near, assert_rejected, json, printed};
+use crate::command_common::{assert_near, assert_rejected, json, printed, run};
 use serde_json::Value;
 use virtual_axes_verification::fixtures::folder::TestFolder;
 
@@ -253,6 +253,9 @@ fn invalid_input_is_rejected_with_its_name() {
         &["identify", &millimeters, "--axis", "x"],
         &["position=COLUMN[mm]", "without --axis, the command with all such units is printed"],
     );
+    let new = run(&["identify", &millimeters, "--new-machine", "M"]);
+    let error = String::from_utf8_lossy(&new.stderr).into_owned();
+    assert!(error.contains("likely in mm") && !error.contains("without --axis"), "{error}");
     rejected(
         &["--column", "position=x.position[deg]"],
         &["--column: the unit of position is [deg]", "linear axis x"],

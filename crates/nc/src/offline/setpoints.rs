@@ -124,7 +124,7 @@ impl PartProgramOptions {
 pub struct ProgramTrack {
     /// Places and activities of the setpoints in order.
     pub setpoints: VecDeque<(PathPlace, ProgramActivity)>,
-    /// Lines of comments that begin an operation, with their texts.
+    /// Lines of comments that begin an operation, with their texts, and without a text the limits of subprograms.
     pub comments: Vec<(usize, String)>,
     /// Programmed path of these setpoints and beyond.
     pub programmed: ProgrammedPath,

@@ -138,11 +138,11 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     check_outputs(arguments)?;
     let Some(axes) = arguments.axes() else { return listing(arguments) };
     run_axes(arguments, axes).map_err(|error| {
-        match error.is::<InvalidResult>()
-            || !next_command::is_corrected(&error.to_string(), &arguments.reading)
-        {
-            true => error,
-            false => format!("{error}; without --axis, the command with all such units is printed").into(),
+        // A new machine has all axes without --axis.
+        let is_listed = arguments.new_machine.is_none() && !error.is::<InvalidResult>();
+        match is_listed && next_command::is_corrected(&error.to_string(), &arguments.reading) {
+            true => format!("{error}; without --axis, the command with all such units is printed").into(),
+            false => error,
         }
     })
 }

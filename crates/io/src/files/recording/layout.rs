@@ -29,7 +29,7 @@ pub(super) struct Layout {
     pub found: Vec<FoundColumn>,
     /// Channels of the columns.
     pub assignment: ColumnAssignment,
-    /// TimestampReader of times of day.
+    /// Reader of dates and times of day.
     pub timestamps: TimestampReader,
     /// True if the first line contains values instead of a header.
     pub is_data: bool,

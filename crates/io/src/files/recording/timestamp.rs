@@ -5,7 +5,7 @@ use std::cell::OnceCell;
 use time::format_description::well_known::Iso8601;
 use time::{Date, OffsetDateTime, PrimitiveDateTime, Time};
 
-/// TimestampReader of a recording: times count from its first time stamp.
+/// Reader of the time stamps of a recording: times count from its first time stamp.
 #[derive(Debug, Default)]
 pub(super) struct TimestampReader {
     origin: OnceCell<OffsetDateTime>,
