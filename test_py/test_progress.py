@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import math
 import os
 import pty
 import re
@@ -10,6 +11,7 @@ import struct
 import subprocess
 import sys
 import termios
+import time
 from pathlib import Path
 
 import pytest
@@ -18,19 +20,31 @@ from node_process import node_binary
 
 ROOT = Path(__file__).resolve().parent.parent
 COMMAND = node_binary().with_name("virtual_axes")
-MOTIONS = 300_000
-"""Number of motions whose interpretation and planning takes longer than a second."""
+MOTIONS = 100_000
+"""Number of motions of one raster."""
+WORK_S = 3.0
+"""Time that `check` takes at least for the program: a bar is shown after one second."""
 CLEARED = b"\r\x1b[2K"
 """Control codes that remove a line."""
 
 
 @pytest.fixture(scope="module")
 def raster(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Rasters one after the other, as many as the machine that runs the test needs for a long work."""
+    command = [sys.executable, ROOT / "tools/part_programs.py", "--raster", str(MOTIONS)]
+    printed = subprocess.run(command, check=True, capture_output=True, text=True, timeout=120).stdout
+    head, start, rest = printed.partition("G0 X0 Y0 Z10\n")
+    motions, end, tail = rest.partition("G49\n")
     program = tmp_path_factory.mktemp("progress") / "raster.nc"
-    with program.open("w") as out:
-        command = [sys.executable, ROOT / "tools/part_programs.py", "--raster", str(MOTIONS)]
-        subprocess.run(command, check=True, stdout=out, timeout=120)
-    return program
+    count = 1
+    while True:
+        program.write_text(head + count * (start + motions) + end + tail)
+        began = time.monotonic()
+        subprocess.run([COMMAND, "check", program], check=True, stdout=subprocess.DEVNULL, timeout=120)
+        elapsed = time.monotonic() - began
+        if elapsed >= WORK_S:
+            return program
+        count = math.ceil(count * min(10.0, 1.5 * WORK_S / elapsed))
 
 
 def on_terminal(arguments: list[object]) -> bytes:

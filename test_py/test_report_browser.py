@@ -246,6 +246,18 @@ def test_a_table_that_scrolls_has_a_shadow(browser: Browser, report: Path):
     browser.show_as()
 
 
+def test_captions_remain_in_view(browser: Browser, report: Path):
+    """A caption wraps in a narrow window, and stays where it is while its table scrolls."""
+    browser.show_as(width=NARROW)
+    show(browser, report)
+    for scrolled in (0, 9999):
+        browser.evaluate(f"document.querySelectorAll('.table').forEach(table => table.scrollLeft = {scrolled})")
+        texts = "[...document.querySelectorAll('caption span')].map(text => text.getBoundingClientRect())"
+        sides = browser.evaluate(f"{texts}.map(({{left, right}}) => [left, right])")
+        assert sides and all(0 <= left < right <= NARROW for left, right in sides)
+    browser.show_as()
+
+
 def test_plots_keep_their_height_in_another_window(browser: Browser, report: Path):
     """A change of the window's width, as by turning a telephone, leaves no plot over the text below it."""
     browser.show_as()

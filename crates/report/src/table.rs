@@ -82,7 +82,7 @@ impl Html {
         let class = if table.is_facts { "facts" } else { "figures" };
         self.append(format_args!("<div class=\"table {class}\" tabindex=\"0\"><table>\n"));
         if !table.caption.is_empty() {
-            self.append(format_args!("<caption>{}</caption>\n", Text(&table.caption)));
+            self.append(format_args!("<caption><span>{}</span></caption>\n", Text(&table.caption)));
         }
         if table.columns.len() > 1 {
             self.heads(table);

@@ -9,8 +9,6 @@ use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use mcap::Compression;
-
 use super::mcap_writer::{ENCODING, McapTopic, McapWriter, QOS_KEY, SCHEMAS, qos_text};
 use crate::messages::Schema;
 use virtual_axes_core::config::QosConfig;
@@ -27,8 +25,8 @@ const MESSAGE: u64 = RECORD + 2 + 4 + 8 + 8;
 const MESSAGE_INDEX_ENTRY: u64 = 8 + 8;
 /// Message index record without its entries: channel, length.
 const MESSAGE_INDEX: u64 = RECORD + 2 + LENGTH;
-/// Name of the compression in a chunk, `zstd`.
-const COMPRESSION: u64 = LENGTH + 4;
+/// Name of the compression in a chunk, `lz4`.
+const COMPRESSION: u64 = LENGTH + 3;
 /// Chunk record without its records: two times, length, checksum, compression, length.
 const CHUNK_HEAD: u64 = RECORD + 8 + 8 + 8 + 4 + COMPRESSION + 8;
 /// Chunk index record without its channels: two times, offset, length, a map, length, compression, two lengths.
@@ -41,9 +39,9 @@ const END: u64 = (RECORD + 4) + (RECORD + 8 + 8 + 4) + 8;
 const STATISTICS: u64 = RECORD + 8 + 2 + 4 + 4 + 4 + 4 + 8 + 8 + LENGTH;
 /// Summary offset records of schemas, channels, statistics and chunk indexes.
 const OFFSETS: u64 = 4 * (RECORD + 1 + 8 + 8);
-/// Maximum constant overhead of zstd: frame, checksum and last block, bytes.
+/// Maximum constant overhead of LZ4: frame, its end and checksum, bytes.
 const COMPRESSED_FRAME: u64 = 128;
-/// Input bytes per additional output byte of incompressible data (`ZSTD_compressBound`).
+/// Input bytes per additional output byte of incompressible data, at least: blocks have a head of 4 bytes.
 const COMPRESSED_SHARE: u64 = 256;
 
 /// Topic to record.
@@ -120,7 +118,7 @@ impl<W: Write> BoundedRecording<W> {
     pub fn new(output: W, bound: u64, topics: &[RecordedTopic]) -> io::Result<Self> {
         let count = Arc::new(AtomicU64::new(0));
         let counting = CountingWriter { output, count: Arc::clone(&count) };
-        let mut writer = McapWriter::with_chunks(counting, None, Compression::Zstd)?;
+        let mut writer = McapWriter::with_chunks(counting, None)?;
         let mut open = 0;
         let mut handles = Vec::with_capacity(topics.len());
         for topic in topics {

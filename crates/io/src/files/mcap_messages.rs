@@ -11,6 +11,8 @@ use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult, Message};
 
+use super::zstd::ZstdDecompressor;
+
 /// Maximum number of bytes per read: buffers grow with the file content, not with a length field.
 pub(super) const BLOCK: usize = 1 << 18;
 /// Schema record before its strings: id, bytes.
@@ -30,9 +32,10 @@ pub(super) struct Messages<R> {
 
 impl<R: Read> Messages<R> {
     /// Creates an iterator that reads `source` from its current position.
-    pub fn new(source: R, options: LinearReaderOptions) -> Self {
-        let reader = LinearReader::new_with_options(options.with_emit_chunks(false));
-        Messages { source, reader, channels: ChannelAccumulator::default(), is_done: false }
+    pub fn new(source: R, options: LinearReaderOptions) -> McapResult<Self> {
+        let mut reader = LinearReader::new_with_options(options.with_emit_chunks(false));
+        reader.add_decompressor(ZstdDecompressor::default())?;
+        Ok(Messages { source, reader, channels: ChannelAccumulator::default(), is_done: false })
     }
 
     /// Returns the source.

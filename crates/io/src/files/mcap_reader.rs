@@ -59,7 +59,8 @@ pub(super) fn read_messages<R: Read + Seek>(
     name: &str,
 ) -> Result<Messages<BufReader<R>>, FileError> {
     input.rewind().map_err(|error| FileError::new(name, error))?;
-    Ok(Messages::new(BufReader::with_capacity(BLOCK, input), options()))
+    Messages::new(BufReader::with_capacity(BLOCK, input), options())
+        .map_err(|error| parse_error(name, &error))
 }
 
 /// Checks the lengths of all chunks, and that records fill each uncompressed chunk, as the MCAP reader requires.

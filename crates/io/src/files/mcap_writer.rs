@@ -44,7 +44,7 @@ pub(super) fn qos_text(qos: QosConfig) -> String {
     )
 }
 
-/// Writer of an MCAP recording.
+/// Writer of an MCAP recording, compressed by LZ4.
 pub(super) struct McapWriter<W: Write> {
     writer: Writer<NoSeek<W>>,
     /// Buffer of a serialized message.
@@ -74,23 +74,19 @@ impl McapTopic {
 }
 
 impl<W: Write> McapWriter<W> {
-    /// Starts a recording with LZ4 compression; `output` does not need to be seekable.
-    ///
-    /// LZ4 is three times as fast as zstd, and files are one seventh longer (traces at each current cycle).
+    /// Starts a recording; `output` does not need to be seekable.
     pub fn new(output: W) -> io::Result<Self> {
-        Self::with_chunks(output, Some(WriteOptions::DEFAULT_CHUNK_SIZE), Compression::Lz4)
+        Self::with_chunks(output, Some(WriteOptions::DEFAULT_CHUNK_SIZE))
     }
 
     /// Starts a recording with chunks of `chunk` bytes, or with a chunk per [`flush`](Self::flush) if `None`.
-    pub fn with_chunks(output: W, chunk: Option<u64>, compression: Compression) -> io::Result<Self> {
+    pub fn with_chunks(output: W, chunk: Option<u64>) -> io::Result<Self> {
         let options = WriteOptions::new()
             .profile(PROFILE)
             .library(LIBRARY)
             .disable_seeking(true)
             .chunk_size(chunk)
-            .compression(Some(compression))
-            // Compression in the writing thread: identical files on each computer.
-            .compression_threads(0);
+            .compression(Some(Compression::Lz4));
         let writer = options.create(NoSeek::new(output)).map_err(into_io)?;
         Ok(McapWriter { writer, bytes: Vec::new() })
     }

@@ -30,6 +30,7 @@ mod row_writer;
 mod trace_csv;
 mod trace_mcap;
 mod tuning_json;
+mod zstd;
 
 pub use bounded_recording::{BoundedRecording, RecordedTopic};
 pub use cdr::encode_cdr;

@@ -14,10 +14,10 @@ use virtual_axes_io::messages::{MotorCurrents, Recorded};
 const QOS: QosConfig = QosConfig { is_reliable: true, is_transient_local: false, depth: 10 };
 /// Message record without its data, bytes.
 const MESSAGE: u64 = 31;
-/// Maximum overhead reserved for a message besides its record: message index entry (16 bytes), chunk header and zstd
-/// frame (53 + 128), three message indexes (3 × 15), chunk index (107) and its summary offset (26), and the counts of
+/// Maximum overhead reserved for a message besides its record: message index entry (16 bytes), chunk header and LZ4
+/// frame (52 + 128), three message indexes (3 × 15), chunk index (106) and its summary offset (26), and the counts of
 /// three channels in the statistics (3 × 10).
-const OVERHEAD: u64 = 16 + 53 + 128 + 3 * 15 + 107 + 26 + 3 * 10;
+const OVERHEAD: u64 = 16 + 52 + 128 + 3 * 15 + 106 + 26 + 3 * 10;
 
 fn topics() -> Vec<RecordedTopic> {
     let schemas = [JointState::schema(), MotorCurrents::schema(), DiagnosticArray::schema()];
@@ -25,7 +25,7 @@ fn topics() -> Vec<RecordedTopic> {
     schemas.into_iter().enumerate().map(topic).collect()
 }
 
-/// Returns the maximum size of compressed data without the zstd frame: one more byte per 256 bytes.
+/// Returns the maximum size of compressed data without the frame of LZ4, at most: one more byte per 256 bytes.
 fn stored(length: u64) -> u64 {
     length + length.div_ceil(256)
 }

@@ -101,7 +101,7 @@ fn drives(stamp: u64, values: [f64; 5]) -> Vec<u8> {
 type Entry<'a> = (&'a str, &'a str, u64, Vec<u8>);
 
 fn record(entries: &[Entry<'_>]) -> Vec<u8> {
-    let options = WriteOptions::new().compression(None).chunk_size(Some(300)).compression_threads(0);
+    let options = WriteOptions::new().compression(None).chunk_size(Some(300));
     let mut writer = options.profile("ros2").create(Cursor::new(Vec::new())).expect("in memory");
     for (k, (topic, kind, log_time, data)) in entries.iter().enumerate() {
         let schema = writer.add_schema(kind, "ros2msg", b"").expect("a schema");

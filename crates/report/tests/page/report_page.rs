@@ -382,7 +382,7 @@ fn figures_stand_in_columns_below_the_verdict() {
     report.write(&mut bytes).expect("memory can be written");
     let page = String::from_utf8(bytes).expect("UTF-8");
     let verdict = page.find("<p class=\"verdict\">gpc: contour error").expect("a verdict");
-    assert!(verdict < page.find("<caption>Path</caption>").expect("a table"));
+    assert!(verdict < page.find("<caption><span>Path</span></caption>").expect("a table"));
     assert!(page.contains("<th scope=\"row\" class=\"group\">circle</th>"));
     assert!(page.contains("<td class=\"number\">13.2 (−81 %)</td>"));
     assert!(page.contains("<p>in parentheses: difference from cascade</p>"));
