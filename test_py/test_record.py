@@ -322,16 +322,16 @@ def test_a_recording_ends_at_its_maximum_size_and_the_axes_continue(start: Calla
 
 
 def test_a_failed_write_ends_the_recording_but_not_the_node(tmp_path: Path):
-    """A file size limit of 200 KiB acts like a full disk: the data written before stay readable.
+    """A file size limit of 1000 KiB, more than one chunk, acts like a full disk: the data before stay readable.
 
     One log line reports it, and the next recording is complete.
     """
     path, binary = tmp_path / "full.mcap", tmp_path / "limited.sh"
-    binary.write_text(f'#!/bin/bash\ntrap "" XFSZ\nulimit -f 200\nexec {node_binary()} "$@"\n')
+    binary.write_text(f'#!/bin/bash\ntrap "" XFSZ\nulimit -f 1000\nexec {node_binary()} "$@"\n')
     binary.chmod(binary.stat().st_mode | stat.S_IXUSR)
     ros_args = ["-p", f"record:={path}", "-p", "time:=fast"]
     with Node(ros_args, binary=binary) as process, AxesClient(process=process) as drive:
-        noise = np.random.default_rng(1).uniform(-1e-4, 1e-4, (1500, 2))
+        noise = np.random.default_rng(1).uniform(-1e-4, 1e-4, (3000, 2))
         times = np.arange(1, len(noise) + 1) * (2 * TSP_NS / NANOSECONDS)
         result = drive.run(joint_trajectory(["x", "y"], times, noise), timeout=120).result
         assert result.status == TrajectoryResult.COMPLETED
@@ -345,7 +345,7 @@ def test_a_failed_write_ends_the_recording_but_not_the_node(tmp_path: Path):
         drive.wait_until(last + 10 * TSP_NS, 10)
         assert process.stop(signal.SIGTERM) == 0
         assert process.output().count("the axes go on") == 1
-    assert path.stat().st_size <= 200 * 1024
+    assert path.stat().st_size <= 1000 * 1024
     messages, _, _ = read(path, whole=False)
     assert len(messages[DRIVES]) > 0 and set(np.diff(stamps(messages[DRIVES]))) <= {TSP_NS}
     again = tmp_path / "again.mcap"
