@@ -154,9 +154,11 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
         sent["/psec"].append(serialize_message(trajectory))
         scaling = drive.in_executor(lambda: drive.node.create_publisher(SpeedScalingFactor, SCALING, 10))
         drive.wait_for(scaling.get_subscription_count, 20, SCALING)
-        scaling.publish(SpeedScalingFactor(factor=0.5))
-        sent[SCALING] = [serialize_message(SpeedScalingFactor(factor=0.5))]
+        sent[SCALING] = []
         for k in range(20):
+            # More than one: the subscription can find its publisher later than the publisher finds it.
+            scaling.publish(SpeedScalingFactor(factor=0.5))
+            sent[SCALING].append(serialize_message(SpeedScalingFactor(factor=0.5)))
             drive.stream(["x"], [0.004 + 1e-6 * k])
             sent["/psec_stream"].append(serialize_message(JointState(name=["x"], position=[0.004 + 1e-6 * k])))
             drive.load({"y": float(k)})
