@@ -169,7 +169,7 @@ impl LineWords {
             }
             _ => {
                 let bit = 1 << index(letter);
-                if self.unused & bit != 0 && state.dialect == Dialect::LinuxCnc {
+                if self.unused & bit != 0 && matches!(state.dialect, Dialect::LinuxCnc | Dialect::Grbl) {
                     return Err(format!("two words {} in one line", char::from(letter.to_ascii_uppercase())));
                 }
                 self.given |= bit;

@@ -127,9 +127,7 @@ impl State {
                 continue;
             }
             if !self.options.axes[axis] {
-                let known = AXIS_LETTERS.into_iter().zip(self.options.axes).filter(|(_, has)| *has);
-                let known = known.map(|(letter, _)| letter.to_string()).collect::<Vec<_>>().join(" ");
-                return Err(format!("word {letter}: the machine has no axis {letter}; axes: {known}"));
+                return Err(self.options.missing_axis(letter));
             }
             values[axis] = Some(value * self.unit(axis));
         }
@@ -481,6 +479,22 @@ impl State {
         }
         self.push_rapid(end)?;
         tcp_length.map_or(Ok(()), |length| self.enter_tcp(length))
+    }
+
+    /// Moves axes to their home switches, the first reference: G28.1 of Mach3. The words are positions at which the axes slow
+    /// down.
+    pub(super) fn home_axes(&mut self, block: &mut LineWords) -> Outcome<()> {
+        self.finish_contour()?;
+        self.moves_in_machine_coordinates = true;
+        let words = self.take_axes(block)?;
+        let mut end = self.position;
+        for ((end, word), reference) in end.iter_mut().zip(words).zip(self.options.references[0]) {
+            *end = word.map_or(*end, |_| reference);
+        }
+        self.assume(
+            "G28.1: homing is a rapid traverse to the reference of G28, no switch is searched".to_owned(),
+        );
+        self.push_rapid(end)
     }
 
     /// Returns the increments of X, Y and Z by U, V and W on a machine of Fanuc and Haas without these axes, m.

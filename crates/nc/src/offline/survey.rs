@@ -11,8 +11,8 @@ use super::extent::{length, norm, positions};
 use super::setpoints::{PartProgramOptions, ProgramTrack};
 use crate::builtin::{open_program, program_folder};
 use crate::interpret::{
-    DetectedDialect, InterpretationReport, Interpreter, InterpreterOptions, Occurrences, TipTransform,
-    system_name,
+    DetectedDialect, InterpretationReport, Interpreter, InterpreterOptions, NO_AXIS, Occurrences,
+    TipTransform, system_name,
 };
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Feed, MotionKind, ProgramEvent, ProgramMotion, ProgramStep};
 
@@ -191,6 +191,12 @@ impl ProgramSurvey {
             ..ProgramTrack::default()
         };
         track.notes()
+    }
+
+    /// Returns the letters of the axes that the program moves and the machine lacks.
+    pub fn missing_axes(&self) -> BTreeSet<char> {
+        let errors = self.report.errors.keys();
+        errors.filter_map(|error| error.split_once(NO_AXIS)?.1.chars().next()).collect()
     }
 
     /// Returns the errors of the program and its travel excess as one page, or `None` for a valid program. A single error

@@ -272,9 +272,7 @@ fn require_axes(words: &Words, state: &State) -> Outcome<()> {
         // A rotary axis that the machine lacks may stay at 0.
         let moves = words.axes[axis].is_some_and(|(value, _)| !(3..6).contains(&axis) || value != 0.0);
         if moves && !state.options.axes[axis] {
-            let known = AXIS_LETTERS.into_iter().zip(state.options.axes).filter(|(_, has)| *has);
-            let known = known.map(|(letter, _)| letter.to_string()).collect::<Vec<_>>().join(" ");
-            return Err(format!("word {letter}: the machine has no axis {letter}; axes: {known}"));
+            return Err(state.options.missing_axis(letter));
         }
     }
     Ok(())
