@@ -50,7 +50,7 @@ struct Evidence {
 }
 
 /// Kinds of evidence: points and text. Of a mill, each may occur alone.
-const KINDS: [(u32, &str); 9] = [
+const KINDS: [(u32, &str); 12] = [
     (ENOUGH, "G71, G72 or G70 with P and Q, a contour cycle"),
     (ENOUGH, "a turning cycle of Sinumerik"),
     (3, "G76 with P and Q, a threading cycle"),
@@ -60,6 +60,9 @@ const KINDS: [(u32, &str); 9] = [
     (2, "G99 without a canned cycle, feed per revolution"),
     (2, "increments U and W beside X and Z"),
     (2, "G7, X as diameter"),
+    (1, "G18, the plane ZX"),
+    (1, "G95, feed per revolution"),
+    (2, "G33, a thread"),
 ];
 const CONTOUR_CYCLE: usize = 0;
 const NAMED_CYCLE: usize = 1;
@@ -70,6 +73,10 @@ const SURFACE_SPEED: usize = 5;
 const PER_REVOLUTION: usize = 6;
 const INCREMENTS: usize = 7;
 const DIAMETER: usize = 8;
+// Of Sinumerik alone.
+const PLANE: usize = 9;
+const FEED_PER_REVOLUTION: usize = 10;
+const THREAD: usize = 11;
 
 impl TurningWord {
     /// Searches the first MiB of a program and returns to its start. Programs with words Y, A, B or with canned cycles G81
@@ -100,6 +107,16 @@ impl Evidence {
         if dialect == Dialect::Sinumerik {
             if let Some(word) = SINUMERIK.into_iter().find(|word| has_name(code, word)) {
                 self.found[NAMED_CYCLE].get_or_insert((number, word.trim_end_matches(['(', '='])));
+            }
+            let has = |letter: char| has_letter(code, letter) || has_name(code, &format!("{letter}="));
+            (self.has_x, self.has_z) = (self.has_x || has('X'), self.has_z || has('Z'));
+            self.has_mill_words |= ['Y', 'A', 'B'].into_iter().any(has) || code.contains("CYCLE");
+            for (kind, word) in
+                [(SURFACE_SPEED, "G96"), (PLANE, "G18"), (FEED_PER_REVOLUTION, "G95"), (THREAD, "G33")]
+            {
+                if has_word(code, word) {
+                    self.found[kind].get_or_insert((number, KINDS[kind].1));
+                }
             }
             return;
         }
@@ -169,6 +186,11 @@ fn is_turning_tool(code: &str) -> bool {
         && !has_word(code, "M06")
         && code.match_indices('T').any(|(at, _)| {
             let digits: String = code[at + 1..].chars().take_while(char::is_ascii_digit).collect();
-            digits.len() == 4 && digits[..2] == digits[2..] && &digits[..2] != "00"
+            // On Okuma, the number of the nose radius compensation stands before.
+            let is_of_turret = matches!(digits.len(), 4 | 6);
+            is_of_turret && {
+                let [tool, offset] = [4, 2].map(|end| &digits[digits.len() - end..][..2]);
+                tool == offset && tool != "00"
+            }
         })
 }
