@@ -13,6 +13,8 @@ const SEARCHED_BYTES: usize = 1 << 20;
 const LINE_BYTES: usize = 4096;
 /// Points from which a program is one for turning.
 const ENOUGH: u32 = 4;
+/// Canned cycles for holes.
+const HOLES: [&str; 9] = ["G81", "G82", "G83", "G84", "G85", "G86", "G87", "G88", "G89"];
 /// Turning cycles of Sinumerik.
 const SINUMERIK: [&str; 13] = [
     "CYCLE93(",
@@ -108,9 +110,10 @@ impl Evidence {
             if let Some(word) = SINUMERIK.into_iter().find(|word| has_name(code, word)) {
                 self.found[NAMED_CYCLE].get_or_insert((number, word.trim_end_matches(['(', '='])));
             }
-            let has = |letter: char| has_letter(code, letter) || has_name(code, &format!("{letter}="));
-            (self.has_x, self.has_z) = (self.has_x || has('X'), self.has_z || has('Z'));
-            self.has_mill_words |= ['Y', 'A', 'B'].into_iter().any(has) || code.contains("CYCLE");
+            let has = |letter: char, name: &str| has_letter(code, letter) || has_name(code, name);
+            (self.has_x, self.has_z) = (self.has_x || has('X', "X="), self.has_z || has('Z', "Z="));
+            self.has_mill_words |=
+                has('Y', "Y=") || has('A', "A=") || has('B', "B=") || code.contains("CYCLE");
             for (kind, word) in
                 [(SURFACE_SPEED, "G96"), (PLANE, "G18"), (FEED_PER_REVOLUTION, "G95"), (THREAD, "G33")]
             {
@@ -127,7 +130,7 @@ impl Evidence {
         }
         let [x, y, z] = ['X', 'Y', 'Z'].map(|letter| has_letter(code, letter));
         (self.has_x, self.has_z) = (self.has_x || x, self.has_z || z);
-        let cycle = (81..=89).any(|cycle| has_word(code, &format!("G{cycle}")));
+        let cycle = HOLES.iter().any(|cycle| has_word(code, cycle));
         self.has_mill_words |= y || cycle || ['A', 'B'].iter().any(|letter| has_letter(code, *letter));
         let [p, q, r, s, u, w] = ['P', 'Q', 'R', 'S', 'U', 'W'].map(|letter| has_letter(code, letter));
         let is_contour = p && q && !x && !z && !r && !has_letter(code, 'I');
