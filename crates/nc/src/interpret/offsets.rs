@@ -120,6 +120,7 @@ impl State {
     /// An axis that the machine lacks, or a coordinate out of range.
     pub(super) fn take_axes(&self, block: &mut LineWords) -> Outcome<[Option<f64>; AXIS_COUNT]> {
         let mut values = [None; AXIS_COUNT];
+        let mut missing = Vec::new();
         for (axis, letter) in AXIS_LETTERS.into_iter().enumerate() {
             let Some(value) = block.take(letter) else { continue };
             if !self.options.axes[axis] && self.dialect != Dialect::LinuxCnc && value == 0.0 && axis >= 3 {
@@ -127,11 +128,12 @@ impl State {
                 continue;
             }
             if !self.options.axes[axis] {
-                return Err(self.options.missing_axis(letter));
+                missing.push(letter);
+                continue;
             }
             values[axis] = Some(value * self.unit(axis));
         }
-        Ok(values)
+        if missing.is_empty() { Ok(values) } else { Err(self.options.missing_axes(&missing)) }
     }
 
     /// Sets offsets and tools: G10 L1, L10 to L13 (tools), L2 (work offset), L20 (coordinates of the position, or

@@ -196,7 +196,8 @@ impl ProgramSurvey {
     /// Returns the letters of the axes that the program moves and the machine lacks.
     pub fn missing_axes(&self) -> BTreeSet<char> {
         let errors = self.report.errors.keys();
-        errors.filter_map(|error| error.split_once(NO_AXIS)?.1.chars().next()).collect()
+        let letters = errors.filter_map(|error| Some(error.split_once(NO_AXIS)?.1.split_once(';')?.0));
+        letters.flat_map(|letters| letters.chars().filter(char::is_ascii_uppercase)).collect()
     }
 
     /// Returns the errors of the program and its travel excess as one page, or `None` for a valid program. A single error

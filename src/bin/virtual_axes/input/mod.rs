@@ -337,20 +337,20 @@ impl CommandInput {
     }
 }
 
-/// Returns the first built-in machine that has the axes of `machine` and the missing ones; `None` without a missing one.
+/// Returns the built-in machine with the fewest axes that has those of `machine` and the missing ones; `None` without a
+/// missing one.
 fn machine_with(machine: &MachineConfig, missing: &BTreeSet<char>) -> Option<&'static str> {
     let axes = |machine: &MachineConfig| -> BTreeSet<String> {
         machine.axes().iter().map(|axis| axis.name().to_ascii_uppercase()).collect()
     };
     let mut wanted = axes(machine);
     wanted.extend(missing.iter().map(char::to_string));
-    let names = MACHINES.iter().map(|(name, _)| *name).filter(|_| !missing.is_empty());
-    let has_wanted = |name: &&str| {
-        let parameters = Parameters::load(name, MACHINES).ok();
-        let found = parameters.and_then(|parameters| parameters.machine_config().ok());
-        found.is_some_and(|found| axes(&found).is_superset(&wanted))
+    let candidate = |name: &'static str| {
+        let found = axes(&Parameters::load(name, MACHINES).ok()?.machine_config().ok()?);
+        found.is_superset(&wanted).then_some((found.len(), name))
     };
-    names.into_iter().find(has_wanted)
+    let candidates = MACHINES.iter().filter(|_| !missing.is_empty()).filter_map(|(name, _)| candidate(name));
+    candidates.min_by_key(|(count, _)| *count).map(|(_, name)| name)
 }
 
 /// Adds the built-in part programs to the error of a name that is not known.

@@ -268,14 +268,15 @@ fn direction(
 
 /// Rejects words of axes that the machine lacks.
 fn require_axes(words: &Words, state: &State) -> Outcome<()> {
+    let mut missing = Vec::new();
     for (axis, letter) in AXIS_LETTERS.into_iter().enumerate() {
         // A rotary axis that the machine lacks may stay at 0.
         let moves = words.axes[axis].is_some_and(|(value, _)| !(3..6).contains(&axis) || value != 0.0);
         if moves && !state.options.axes[axis] {
-            return Err(state.options.missing_axis(letter));
+            missing.push(letter);
         }
     }
-    Ok(())
+    if missing.is_empty() { Ok(()) } else { Err(state.options.missing_axes(&missing)) }
 }
 
 /// Completes the end of a line by its angle ANG and one coordinate.
