@@ -126,3 +126,22 @@ fn invalid_setups_name_the_parameter_and_the_remedy() {
         }
     }
 }
+
+#[test]
+fn an_axis_that_the_machine_lacks_names_a_template_with_it() {
+    let folder = TestFolder::new("program_setup_axis");
+    let check = |program: &str, machine: &str| {
+        let program = folder.file("part.nc", program);
+        let output = run(&["check", program.to_str().expect("UTF-8"), "--machine", machine]);
+        assert!(!output.status.success());
+        String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let text = check("G21 G0 A90\nM2\n", "vmc");
+    assert!(text.contains("the machine has no axis A"), "{text}");
+    assert!(text.ends_with("virtual_axes machines --new vmc_a > mine.yaml"), "{text}");
+    let text = check("G21 G0 A10 C90\nM2\n", "vmc");
+    assert!(text.ends_with("virtual_axes machines --new mikron_ucp710 > mine.yaml"), "{text}");
+    // No built-in machine has U.
+    let text = check("G21 G0 U10\nM2\n", "vmc");
+    assert!(text.contains("no axis U") && !text.contains("--new"), "{text}");
+}

@@ -33,6 +33,10 @@ impl State {
         }
         let [first, second, _] = self.modal.plane.axes();
         let has_end = block.has_any(&[AXIS_LETTERS[first], AXIS_LETTERS[second]]) || block.polar != [None; 2];
+        if self.dialect == Dialect::Grbl && !has_end {
+            let [first, second] = [first, second].map(|axis| AXIS_LETTERS[axis]);
+            return Err(format!("grbl requires {first} or {second} in the line of an arc (error 32)"));
+        }
         let (start, end) = (self.programmed(), self.targets(block)?);
         if self.dialect == Dialect::Fanuc && block.get('R').is_some() {
             // R comes before the center; without a distance to the end it is an arc of 0°.

@@ -119,10 +119,10 @@ codes! {
         Data = 100 in OTHERS, "G10: sets offsets and tools";
         ReferenceCheck = 270 in FH, "G27: moves to a point";
         ToReference = 280 in ALL, "G28: moves to the first reference";
-        StoreReference = 281 in NGC, "G28.1: stores the first reference";
+        StoreReference = 281 in NGC, "G28.1: stores the first reference; of Mach3, homes axes";
         FromReference = 290 in FH, "G29: moves through the point of the last G28";
         ToSecondReference = 300 in ALL & !MARLIN, "G30: moves to the second reference";
-        StoreSecondReference = 301 in NGC, "G30.1: stores the second reference";
+        StoreSecondReference = 301 in LINUXCNC | GRBL, "G30.1: stores the second reference";
         Shift = 520 in OTHERS, "G52: shifts all coordinate systems";
         MachineCoordinates = 530 in OTHERS, "G53: line in machine coordinates";
         TiltTool = 531 in FH, "G53.1: turns the tool axis normal to the tilted plane";
@@ -152,7 +152,7 @@ codes! {
         Absolute = 900 in ALL, "G90"; Incremental = 910 in ALL, "G91";
     }
     arc_distance: ArcDistance, "Meaning of the centers of arcs" {
-        Absolute = 901 in NGC, "G90.1"; Incremental = 911 in NGC, "G91.1";
+        Absolute = 901 in NGC & !dialect::GRBL, "G90.1"; Incremental = 911 in NGC, "G91.1";
     }
     feed_mode: FeedMode, "Meaning of the F word" {
         InverseTime = 930 in ALL, "G93: inverse of the duration";
@@ -165,9 +165,9 @@ codes! {
     }
     cutter_compensation: CutterCompensation, "Cutter radius compensation" {
         Off = 400 in ALL, "G40: none";
-        Left = 410 in ALL, "G41: tool left of the path";
+        Left = 410 in ALL & !dialect::GRBL, "G41: tool left of the path";
         LeftDiameter = 411 in LINUXCNC, "G41.1: tool left of the path, D is its diameter";
-        Right = 420 in ALL, "G42: tool right of the path";
+        Right = 420 in ALL & !dialect::GRBL, "G42: tool right of the path";
         RightDiameter = 421 in LINUXCNC, "G42.1: tool right of the path, D is its diameter";
     }
     tool_length: ToolLength, "Tool length" {
@@ -320,6 +320,9 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
 
 /// Codes that change the geometry and are known, with their remedies.
 const REMEDIES: &[(u16, &str)] = &[
+    (410, "grbl has no cutter compensation (error 20): let the CAM system output the offset path"),
+    (420, "grbl has no cutter compensation (error 20): let the CAM system output the offset path"),
+    (901, "grbl has relative arc centers only (error 20): post the program with relative I, J, K"),
     (300, "a probing of the bed, which moves Z until it touches: remove it"),
     (71, "cylindrical interpolation: program the motions of the axes"),
     (121, "polar coordinate interpolation: program the motions of the axes"),
@@ -472,7 +475,8 @@ fn is_in_effect(other: Option<u16>, code: u16, name: fn(u16) -> String, dialect:
         // Beside another motion code, G80 has no effect.
         None | Some(CANCEL) => Ok(true),
         Some(_) if code == CANCEL => Ok(false),
-        Some(_) if dialect != Dialect::LinuxCnc => Ok(true),
+        Some(other) if other == code && dialect == Dialect::Grbl => Ok(true),
+        Some(_) if !matches!(dialect, Dialect::LinuxCnc | Dialect::Grbl) => Ok(true),
         Some(other) => Err(format!("{} and {} exclude each other in one line", name(other), name(code))),
     }
 }

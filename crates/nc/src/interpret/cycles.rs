@@ -79,6 +79,9 @@ impl State {
         self.finish_contour()?;
         let [first, second, drill] = self.modal.plane.axes();
         let name = g_name(code.number());
+        if self.dialect == Dialect::Grbl {
+            self.assume(format!("{name}: grblHAL has canned cycles, grbl 1.1 rejects them (error 20)"));
+        }
         let is_linuxcnc = self.dialect == Dialect::LinuxCnc;
         let others = (0..AXIS_COUNT).filter(|axis| ![first, second, drill].contains(axis));
         if let Some(axis) =
@@ -390,7 +393,7 @@ fn lateral_shift(cycle: &Cycle) -> [f64; 2] {
 }
 
 /// Returns true for the code of a canned cycle.
-fn is_canned(code: Motion) -> bool {
+pub(super) fn is_canned(code: Motion) -> bool {
     code.number() >= Motion::ChipBreaking.number() && code != Motion::Cancel
 }
 

@@ -134,7 +134,9 @@ impl DetectedDialect {
         if let Some(extension) = extension
             && let Some(dialect) = Dialect::of_extension(extension)
         {
-            scores[dialect as usize].add(ENOUGH, &format!("the extension {extension}"), 1);
+            // Programs of Okuma have words that alone would be those of Sinumerik.
+            let points = if dialect == Dialect::Okuma { 4 * ENOUGH } else { ENOUGH };
+            scores[dialect as usize].add(points, &format!("the extension {extension}"), 1);
         }
         let (mut bytes, mut line) = (0, Vec::new());
         let encoding = TextEncoding::of(source.fill_buf().unwrap_or_default());
@@ -632,6 +634,7 @@ mod tests {
             ("PART.MPF", "G90 G0 X1\nM30\n", "sinumerik"),
             ("/jobs/part.eia", "G90 G0 X1\nM30\n", "fanuc"),
             ("PART.MIN", "G90 G0 X1\nM30\n", "okuma"),
+            ("PART.MIN", "G90 G0 X1\nSB=1500 M13\nM30\n", "okuma"),
             ("part.eia", "(HAAS VF-2)\nG90 G0 X1\nM30\n", "haas"),
             ("part.nc", "G90 G0 X1\nM30\n", "linuxcnc"),
         ] {

@@ -9,6 +9,7 @@ use super::codes::{
     g_name,
 };
 use super::contour::Corner;
+use super::cycles::is_canned;
 use super::dialect::Dialect;
 use super::error::Outcome;
 use super::line_words::{LineWords, Setting};
@@ -54,6 +55,14 @@ impl State {
         }
         for (name, remedy) in &codes.unsupported {
             self.reject(format!("{name} is not supported in the dialect {}: {remedy}", self.dialect))?;
+        }
+        if codes.g.motion.is_some() {
+            // Until the line has been executed: its next lines would have consequences of its error.
+            self.has_failed_cycle = codes.g.motion.is_some_and(is_canned);
+        }
+        if self.dialect == Dialect::Grbl {
+            // F has the units of its line.
+            self.set_plane_and_units(block, &codes);
         }
         self.set_feed(block, &codes)?;
         self.set_spindle_and_tool(block, &codes)?;
@@ -101,6 +110,9 @@ impl State {
         if self.dialect != Dialect::LinuxCnc {
             // Offset numbers may stand anywhere.
             block.skip("DH");
+        }
+        if codes.g.motion.is_some() && codes.unsupported.is_empty() {
+            self.has_failed_cycle = false;
         }
         block.require_used()
     }
@@ -171,6 +183,11 @@ impl State {
         let of_macro = matches!(codes.g.action, Some(Action::ToolChange111 | Action::ToolChange116));
         match codes.m.tool_change.or(of_macro.then_some(ToolChange::Change)) {
             Some(ToolChange::Change) => {
+                if of_macro && block.has_any(&['P', 'Q', 'R']) {
+                    // G111 and G116 are macros of the machine builder.
+                    self.assume("words P, Q and R of a tool change macro have no effect".to_owned());
+                    block.skip("PQR");
+                }
                 self.modal.tool = self.modal.selected_tool;
                 self.push_event(ProgramEvent::ToolChange(self.modal.tool));
                 self.push_pause(self.options.tool_change_time);
@@ -272,6 +289,10 @@ impl State {
                 self.dialect,
                 value * MILLISECOND
             ));
+        } else if self.dialect == Dialect::Mach3 {
+            self.assume(
+                "dwell P is in s; with the setting \"G04 Dwell in ms\" of Mach3 it would be in ms".to_owned(),
+            );
         }
         Ok(Some(if is_ms { value * MILLISECOND } else { value }))
     }
@@ -366,10 +387,12 @@ impl State {
                 | Action::Shift
                 | Action::ShiftToPosition),
             ) => Some(code.number()),
+            Some(code @ Action::StoreReference) if self.dialect == Dialect::Mach3 => Some(code.number()),
             _ => is_given_length.then_some(ToolLength::Given.number()),
         };
         // Post-processors write G0 G28, where the motion is a rapid traverse anyway.
         let is_plain = motion == Some(Motion::Rapid)
+            && self.dialect != Dialect::Grbl
             && (self.dialect != Dialect::LinuxCnc
                 || matches!(codes.g.action, Some(Action::ToReference | Action::ToSecondReference)));
         let is_end = motion == Some(Motion::Cancel) && self.dialect != Dialect::LinuxCnc;
@@ -409,6 +432,7 @@ impl State {
             Some(Action::TiltTool | Action::TiltTool253) => self.tilt_tool(block)?,
             Some(Action::ClockwisePocket) => self.circular_pocket(block, true)?,
             Some(Action::CounterclockwisePocket) => self.circular_pocket(block, false)?,
+            Some(Action::StoreReference) if self.dialect == Dialect::Mach3 => self.home_axes(block)?,
             Some(Action::StoreReference) => self.store_reference(0)?,
             Some(Action::StoreSecondReference) => self.store_reference(1)?,
             Some(Action::Shift) => self.shift(block, Action::Shift)?,
@@ -428,7 +452,7 @@ impl State {
                 self.modal.cycle = None;
             }
             self.modal.motion = match (motion, self.dialect) {
-                (Motion::Cancel, Dialect::LinuxCnc) => None,
+                (Motion::Cancel, Dialect::LinuxCnc | Dialect::Grbl) => None,
                 (Motion::Cancel, _) => Some(Motion::Rapid),
                 _ => Some(motion),
             };

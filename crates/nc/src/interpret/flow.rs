@@ -130,10 +130,10 @@ impl<R: BufRead + Seek> Interpreter<R> {
                         let place = self.numbered_line(number)?;
                         return self.source.jump(place);
                     }
-                    self.state.assume(
-                        "M99 in the main program repeats it without end: the simulation ends there"
-                            .to_owned(),
-                    );
+                    let word = if self.state.dialect == Dialect::Okuma { "RTS" } else { "M99" };
+                    self.state.assume(format!(
+                        "{word} in the main program repeats it without end: the simulation ends there"
+                    ));
                     self.state.end()
                 }
             },

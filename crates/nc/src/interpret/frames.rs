@@ -26,7 +26,15 @@ impl State {
     /// Sets polar coordinates and frames: G15, G16, G50, G51, G50.1, G51.1, G68, G68.2, G68.3, G69.
     pub(super) fn set_frames(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
         match codes.g.polar {
-            Some(Polar::On) => self.modal.polar = Some([0.0; 2]),
+            Some(Polar::On) => {
+                self.modal.polar = Some([0.0; 2]);
+                // The center is the position on Mach3, and the zero of the workpiece on other controls.
+                if self.dialect == Dialect::Mach3 {
+                    let [first, second, _] = self.modal.plane.axes();
+                    let position = self.programmed();
+                    self.modal.polar_center = [position[first], position[second]];
+                }
+            }
             Some(Polar::Off) => self.modal.polar = None,
             None => {}
         }
@@ -228,6 +236,7 @@ impl State {
         end: &mut Coordinates,
         raw: [f64; 2],
     ) {
+        let center = self.modal.polar_center;
         let Some([radius, angle]) = &mut self.modal.polar else { return };
         if !words[0] && !words[1] {
             return;
@@ -239,7 +248,7 @@ impl State {
             *angle = if self.modal.is_incremental { *angle + raw[1] } else { raw[1] };
         }
         let (sin, cos) = angle.to_radians().sin_cos();
-        (end[first], end[second]) = (*radius * cos, *radius * sin);
+        (end[first], end[second]) = (center[0] + *radius * cos, center[1] + *radius * sin);
     }
 }
 

@@ -154,9 +154,11 @@ impl LineWords {
             b'o' if state.dialect != Dialect::Marlin || self.m.is_empty() => {
                 return Err(format!("{word}: an O-word stands at the start of the line"));
             }
-            // The position of an extruder that G92 sets, and its settings.
+            // The position of an extruder that G92 sets, beside G90 and G91, and its settings.
             b'e' if state.dialect == Dialect::Marlin
-                && (self.g.contains(&920) || !self.m.is_empty() || !self.ignored.is_empty()) =>
+                && (self.g.iter().any(|code| matches!(code, 900 | 910 | 920))
+                    || !self.m.is_empty()
+                    || !self.ignored.is_empty()) =>
             {
                 self.given |= 1 << index(letter);
             }
@@ -169,7 +171,7 @@ impl LineWords {
             }
             _ => {
                 let bit = 1 << index(letter);
-                if self.unused & bit != 0 && state.dialect == Dialect::LinuxCnc {
+                if self.unused & bit != 0 && matches!(state.dialect, Dialect::LinuxCnc | Dialect::Grbl) {
                     return Err(format!("two words {} in one line", char::from(letter.to_ascii_uppercase())));
                 }
                 self.given |= bit;

@@ -40,6 +40,7 @@ mod state;
 mod surface;
 mod text;
 mod tools;
+mod turning;
 mod work_offset;
 
 use std::io::{BufRead, Seek};
@@ -54,6 +55,7 @@ pub use error::ProgramError;
 pub use ignored::{CodePattern, IgnoredCodes};
 pub use limits::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
 pub use line_modes::LineModes;
+pub(crate) use options::NO_AXIS;
 pub use options::{InterpreterOptions, TipTransform};
 pub use report::{InterpretationReport, OccurrenceTable, Occurrences};
 pub use tools::{Tool, ToolTable};
@@ -67,6 +69,7 @@ use self::sinumerik::Sinumerik;
 use self::source::{LineSource, SourceHead};
 use self::state::State;
 use self::text::LineText;
+use self::turning::TurningWord;
 use crate::motion::{Coordinates, ProgramStep};
 
 /// Interpreter of one program: an iterator over its steps, in memory independent of the program's length.
@@ -83,18 +86,20 @@ pub struct Interpreter<R> {
     dialect: DetectedDialect,
     /// Front end of native Sinumerik programs.
     sinumerik: Sinumerik,
-    /// Format of another control, which is not supported.
-    foreign: Option<&'static str>,
+    /// Line and reason of a format of another control, or of a turning program, which are not supported.
+    foreign: Option<(usize, String)>,
 }
 
 impl<R: BufRead + Seek> Interpreter<R> {
     /// Creates the interpreter of the program in `source`, from its start; `name` is the file in messages.
     pub fn new(mut source: R, name: &str, mut options: InterpreterOptions) -> Self {
-        let foreign = SourceHead::of(&mut source).foreign;
+        let foreign = SourceHead::of(&mut source).foreign.map(|format| (1, foreign_reason(format)));
         let dialect = match options.dialect {
             Some(dialect) => DetectedDialect { dialect, evidence: None },
             None => DetectedDialect::of(&mut source, name),
         };
+        let turning = || TurningWord::of(&mut source, dialect.dialect).map(turning_reason);
+        let foreign = foreign.or_else(turning);
         let has_given_dialect = options.dialect.replace(dialect.dialect).is_some();
         let mut state = State::new(options);
         state.has_given_dialect = has_given_dialect;
@@ -171,7 +176,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
             if self.execute_statement(place)? {
                 return Ok(());
             }
-        } else if self.state.dialect.is_firmware() && self.execute_command() {
+        } else if self.state.dialect.is_firmware() && self.execute_command()? {
             return Ok(());
         }
         if is_o_word(&self.line.text) && !self.state.dialect.has_macro_b() {
@@ -204,12 +209,15 @@ impl<R: BufRead + Seek> Interpreter<R> {
 
     /// Executes a command of grbl (`$H`, `?`), or a message of firmware for printers and routers (`M117 Drill 2`, `M0 Put
     /// tool 1`); returns false for a line of words.
-    fn execute_command(&mut self) -> bool {
+    fn execute_command(&mut self) -> Outcome<bool> {
         let text = self.line.text.as_slice();
+        if let Some(words) = text.strip_prefix(b"$j=").filter(|_| self.state.dialect == Dialect::Grbl) {
+            return self.jog([b"g1", words].concat()).map(|()| true);
+        }
         if matches!(text, [b'$', ..] | [b'?' | b'!' | b'~']) {
             let command = String::from_utf8_lossy(text).to_uppercase();
             self.state.note_without_effect(command);
-            return true;
+            return Ok(true);
         }
         // The blank after the code, which the compact text lacks, separates it from digits of the message.
         let raw = String::from_utf8_lossy(&self.line.raw);
@@ -219,10 +227,21 @@ impl<R: BufRead + Seek> Interpreter<R> {
         match code.to_ascii_uppercase().as_str() {
             "M117" | "M118" => {}
             "M0" | "M00" if is_text => self.state.push_event(crate::motion::ProgramEvent::Stop),
-            _ => return false,
+            _ => return Ok(false),
         }
         self.state.push_event(crate::motion::ProgramEvent::Message(escaped(message)));
-        true
+        Ok(true)
+    }
+
+    /// Executes the words of a jog of grbl, a line at feed that changes no mode.
+    fn jog(&mut self, words: Vec<u8>) -> Outcome<()> {
+        let modal = self.state.modal.clone();
+        // A jog has a feed of its own.
+        self.state.modal.feed = None;
+        self.line.text = words;
+        let result = self.execute_words(0);
+        self.state.modal = modal;
+        result
     }
 
     /// Executes the words of the present line from a byte on.
@@ -242,6 +261,11 @@ fn foreign_reason(format: &str) -> String {
     format!("{format} is not supported: post the program again as G code, in one of the dialects {dialects}")
 }
 
+/// Returns line and reason of the rejection of a turning program.
+fn turning_reason(TurningWord { text, line }: TurningWord) -> (usize, String) {
+    (line, format!("a turning program, by {text}: only programs for milling are supported"))
+}
+
 impl<R: BufRead + Seek> Iterator for Interpreter<R> {
     type Item = Result<ProgramStep, ProgramError>;
 
@@ -254,13 +278,9 @@ impl<R: BufRead + Seek> Iterator for Interpreter<R> {
             if self.state.has_ended {
                 return None;
             }
-            if let Some(format) = self.foreign.take() {
+            if let Some((line, reason)) = self.foreign.take() {
                 self.state.has_ended = true;
-                return Some(Err(ProgramError {
-                    name: self.name.clone(),
-                    line: 1,
-                    reason: foreign_reason(format),
-                }));
+                return Some(Err(ProgramError { name: self.name.clone(), line, reason }));
             }
             let line = self.execute_line();
             let at_file = |reason: String| match self.source.line_of_file() {

@@ -52,6 +52,9 @@ impl State {
             if is_linuxcnc && (self.modal.is_incremental || !is_straight) {
                 return Err("G53 requires G90 with G0 or G1".to_owned());
             }
+            if self.dialect == Dialect::Grbl && !is_straight {
+                return Err("G53 requires G0 or G1 (error 30)".to_owned());
+            }
             return self.move_in_machine_coordinates(block, code);
         }
         if !has_words && code != Motion::Nurbs {
@@ -78,6 +81,10 @@ impl State {
             Motion::CounterclockwiseArc => self.arc(block, false),
             Motion::CubicSpline | Motion::QuadraticSpline | Motion::Nurbs => self.start_spline(block, code),
             Motion::Cancel | Motion::NurbsEnd => Ok(()),
+            _ if motion.is_none() && self.has_failed_cycle => {
+                block.skip("ABCIJKLPQRUVWXYZ");
+                Ok(())
+            }
             _ => self.cycle(block, code),
         }
     }
@@ -180,6 +187,11 @@ impl State {
         // The position of the touch.
         for axis in 0..AXIS_COUNT {
             self.parameters.set_of_control(5061 + axis, self.coordinate(axis))?;
+        }
+        if self.dialect == Dialect::Mach3 {
+            for axis in 0..6 {
+                self.parameters.set_numbered(2000 + axis, self.coordinate(axis))?;
+            }
         }
         self.parameters.set_of_control(5070, 1.0)?;
         if code == Motion::Skip {

@@ -120,6 +120,7 @@ impl State {
     /// An axis that the machine lacks, or a coordinate out of range.
     pub(super) fn take_axes(&self, block: &mut LineWords) -> Outcome<[Option<f64>; AXIS_COUNT]> {
         let mut values = [None; AXIS_COUNT];
+        let mut missing = Vec::new();
         for (axis, letter) in AXIS_LETTERS.into_iter().enumerate() {
             let Some(value) = block.take(letter) else { continue };
             if !self.options.axes[axis] && self.dialect != Dialect::LinuxCnc && value == 0.0 && axis >= 3 {
@@ -127,13 +128,12 @@ impl State {
                 continue;
             }
             if !self.options.axes[axis] {
-                let known = AXIS_LETTERS.into_iter().zip(self.options.axes).filter(|(_, has)| *has);
-                let known = known.map(|(letter, _)| letter.to_string()).collect::<Vec<_>>().join(" ");
-                return Err(format!("word {letter}: the machine has no axis {letter}; axes: {known}"));
+                missing.push(letter);
+                continue;
             }
             values[axis] = Some(value * self.unit(axis));
         }
-        Ok(values)
+        if missing.is_empty() { Ok(values) } else { Err(self.options.missing_axes(&missing)) }
     }
 
     /// Sets offsets and tools: G10 L1, L10 to L13 (tools), L2 (work offset), L20 (coordinates of the position, or
@@ -481,6 +481,22 @@ impl State {
         }
         self.push_rapid(end)?;
         tcp_length.map_or(Ok(()), |length| self.enter_tcp(length))
+    }
+
+    /// Moves axes to their home switches, the first reference: G28.1 of Mach3. The words are positions at which the axes slow
+    /// down.
+    pub(super) fn home_axes(&mut self, block: &mut LineWords) -> Outcome<()> {
+        self.finish_contour()?;
+        self.moves_in_machine_coordinates = true;
+        let words = self.take_axes(block)?;
+        let mut end = self.position;
+        for ((end, word), reference) in end.iter_mut().zip(words).zip(self.options.references[0]) {
+            *end = word.map_or(*end, |_| reference);
+        }
+        self.assume(
+            "G28.1: homing is a rapid traverse to the reference of G28, no switch is searched".to_owned(),
+        );
+        self.push_rapid(end)
     }
 
     /// Returns the increments of X, Y and Z by U, V and W on a machine of Fanuc and Haas without these axes, m.

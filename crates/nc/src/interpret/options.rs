@@ -1,11 +1,13 @@
 //! Options of the interpreter.
 
 use std::collections::BTreeSet;
+use std::f64::consts::PI;
 use std::path::PathBuf;
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use virtual_axes_core::config::{MachineConfig, PartProgramConfig};
 use virtual_axes_core::kinematics::{Kinematics, ToolPose};
+use virtual_axes_core::units::{DEGREE, Rounded};
 
 use super::dialect::Dialect;
 use super::error::Outcome;
@@ -14,6 +16,11 @@ use super::limits::{ADDITIONAL_OFFSET_COUNT, REPEATED_LINES, WORK_OFFSET_COUNT};
 use super::tools::ToolTable;
 use super::work_offset::WorkOffset;
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Blend, Coordinates, PathControl};
+
+/// Text before the letters of axes that the machine lacks, up to a semicolon.
+pub(crate) const NO_AXIS: &str = "the machine has no axis ";
+/// Difference of two directions, and of an angle from its travel limit, that is rounding, rad.
+const SAME_DIRECTION: f64 = 1e-9;
 
 /// Options of the interpreter: machine, offsets and tolerances that the program relies on.
 #[derive(Debug, Clone)]
@@ -135,6 +142,14 @@ impl InterpreterOptions {
         Ok(self)
     }
 
+    /// Returns the error of words of axes that the machine lacks.
+    pub(super) fn missing_axes(&self, letters: &[char]) -> String {
+        let known = AXIS_LETTERS.into_iter().zip(self.axes).filter(|(_, has)| *has);
+        let known = known.map(|(letter, _)| letter.to_string()).collect::<Vec<_>>().join(" ");
+        let missing = letters.iter().map(char::to_string).collect::<Vec<_>>().join(" ");
+        format!("word {missing}: {NO_AXIS}{missing}; axes: {known}")
+    }
+
     /// Sets a work offset, which counts as given.
     pub(crate) fn set_work_offset(&mut self, WorkOffset { index, coordinates }: &WorkOffset) {
         self.work_offsets[*index] = *coordinates;
@@ -173,6 +188,8 @@ pub struct TipTransform {
     workpiece: [f64; 3],
     /// Index in [`Coordinates`] of each joint of the machine.
     joints: Vec<Option<usize>>,
+    /// Travel limits of each joint, m or rad.
+    travel: Vec<[f64; 2]>,
 }
 
 impl TipTransform {
@@ -182,7 +199,14 @@ impl TipTransform {
             AXIS_LETTERS.iter().position(|letter| name.eq_ignore_ascii_case(&letter.to_string()))
         };
         let joints = machine.axes().iter().map(|axis| letter(axis.name())).collect();
-        Self { kinematics: Kinematics::new(machine), workpiece: machine.kinematics().workpiece, joints }
+        let limits = machine.axes().iter().map(|axis| axis.limits());
+        let travel = limits.map(|limits| [limits.travel_min, limits.travel_max]).collect();
+        Self {
+            kinematics: Kinematics::new(machine),
+            workpiece: machine.kinematics().workpiece,
+            joints,
+            travel,
+        }
     }
 
     /// Computes the joint positions of the machine, in its order, at a position of a motion. `tcp_length` is
@@ -237,15 +261,49 @@ impl TipTransform {
         direction: f64,
     ) -> Outcome<Coordinates> {
         let found = self.oriented(axis, near)?;
-        let first = (3..6).find(|axis| self.joints.contains(&Some(*axis)));
-        let Some(first) = first.filter(|first| direction * found[*first] < 0.0) else { return Ok(found) };
-        // The other solution has the opposite angle, and the second rotary axis half a turn away.
-        let mut other = found;
-        other[first] = -other[first];
-        let second = (first + 1..6).find(|axis| self.joints.contains(&Some(*axis)));
-        second.into_iter().for_each(|axis| other[axis] += std::f64::consts::PI);
+        let is_against = self.first_rotary_axis().is_some_and(|first| direction * found[first] < 0.0);
+        let Some(other) = self.other_solution(&found).filter(|_| is_against) else { return Ok(found) };
         let other = self.oriented(axis, &other)?;
-        Ok(if direction * other[first] > 0.0 { other } else { found })
+        let is_reached = self.first_rotary_axis().is_some_and(|first| direction * other[first] > 0.0);
+        Ok(if is_reached { other } else { found })
+    }
+
+    /// Returns the first rotary axis of A, B and C.
+    pub(super) fn first_rotary_axis(&self) -> Option<usize> {
+        (3..6).find(|axis| self.joints.contains(&Some(*axis)))
+    }
+
+    /// Returns the other axis positions with the same tool axis: the first rotary axis at the opposite angle, the second one
+    /// half a turn away; `None` without two rotary axes that have this property, or if both solutions are the same.
+    pub(super) fn other_solution(&self, position: &Coordinates) -> Option<Coordinates> {
+        let first = self.first_rotary_axis().filter(|first| position[*first] != 0.0)?;
+        let second = (first + 1..6).find(|axis| self.joints.contains(&Some(*axis)))?;
+        let mut other = *position;
+        other[first] = -other[first];
+        other[second] += PI;
+        let [from, to] = [position, &other].map(|position| Vector3::from(self.direction(position)));
+        ((from - to).norm() < SAME_DIRECTION).then_some(other)
+    }
+
+    /// Returns the rotary axes beyond their travel limits at axis positions, as text; empty without one.
+    pub(super) fn rotary_excess(&self, position: &Coordinates) -> String {
+        let joints = self.joints.iter().zip(&self.travel);
+        let beyond = joints.filter_map(|(axis, [least, most])| {
+            let axis = axis.filter(|axis| (3..6).contains(axis))?;
+            let value = position[axis];
+            let is_beyond = value < least - SAME_DIRECTION || value > most + SAME_DIRECTION;
+            let [value, least, most] = [value, *least, *most].map(|angle| Rounded(angle / DEGREE));
+            let letter = AXIS_LETTERS[axis];
+            is_beyond.then(|| format!("{letter} {value}° is beyond its travel of {least}° to {most}°"))
+        });
+        beyond.collect::<Vec<_>>().join(" and ")
+    }
+
+    /// Returns the angles of the rotary axes at axis positions, as text: `A 30° C 90°`.
+    pub(super) fn rotary_text(&self, position: &Coordinates) -> String {
+        let axes = (3..6).filter(|axis| self.joints.contains(&Some(*axis)));
+        let text = axes.map(|axis| format!("{} {}°", AXIS_LETTERS[axis], Rounded(position[axis] / DEGREE)));
+        text.collect::<Vec<_>>().join(" ")
     }
 
     /// Returns the orientation of the tool in the workpiece at axis positions; its third column is the tool axis.

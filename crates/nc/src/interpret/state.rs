@@ -43,6 +43,8 @@ pub(super) struct State {
     pub dialect: Dialect,
     /// True if the options name the dialect, false if it was detected.
     pub has_given_dialect: bool,
+    /// True after an error in the line of the canned cycle in effect, of which the next lines would be consequences.
+    pub has_failed_cycle: bool,
     /// True if the program has set the units, or a note says that it did not.
     pub has_units: bool,
     /// Programmable frame: scaling, mirroring, rotation.
@@ -147,6 +149,8 @@ pub(super) struct Modal {
     pub radius_number: Option<u32>,
     /// Polar coordinates (G16): radius, m, and angle, degrees.
     pub polar: Option<[f64; 2]>,
+    /// Center of polar coordinates in the plane, m.
+    pub polar_center: [f64; 2],
     /// Parts of the programmable frame: scaling (G51), mirroring (G51.1), rotation (G68).
     pub frames: [CoordinateFrame; 3],
     /// Lines of a plane by points or vectors (G68.2 P2, P3) before its last one, by Q: a point, m, and a vector or angle.
@@ -214,6 +218,7 @@ impl State {
             has_tool_vectors: false,
             radius_number: None,
             polar: None,
+            polar_center: [0.0; 2],
             frames: [CoordinateFrame::identity(); 3],
             plane_points: [None; 4],
             between: [0.0; AXIS_COUNT],
@@ -237,6 +242,7 @@ impl State {
             },
             dialect: options.dialect.unwrap_or_default(),
             has_given_dialect: false,
+            has_failed_cycle: false,
             has_units: false,
             frame: CoordinateFrame::identity(),
             tilt: None,

@@ -65,6 +65,8 @@ impl LineText {
                     }
                 }
                 b'\'' if dialect == Dialect::Mach3 => break,
+                // Commands that grbl takes out of the stream of characters.
+                b'?' | b'!' | b'~' if dialect == Dialect::Grbl && !self.text.is_empty() => {}
                 // Checksum of a host.
                 b'*' if dialect == Dialect::Marlin => break,
                 b':' if matches!(dialect, Dialect::Fanuc | Dialect::Haas) && self.text.is_empty() => {

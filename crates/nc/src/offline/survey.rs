@@ -11,8 +11,8 @@ use super::extent::{length, norm, positions};
 use super::setpoints::{PartProgramOptions, ProgramTrack};
 use crate::builtin::{open_program, program_folder};
 use crate::interpret::{
-    DetectedDialect, InterpretationReport, Interpreter, InterpreterOptions, Occurrences, TipTransform,
-    system_name,
+    DetectedDialect, InterpretationReport, Interpreter, InterpreterOptions, NO_AXIS, Occurrences,
+    TipTransform, system_name,
 };
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Feed, MotionKind, ProgramEvent, ProgramMotion, ProgramStep};
 
@@ -191,6 +191,13 @@ impl ProgramSurvey {
             ..ProgramTrack::default()
         };
         track.notes()
+    }
+
+    /// Returns the letters of the axes that the program moves and the machine lacks.
+    pub fn missing_axes(&self) -> BTreeSet<char> {
+        let errors = self.report.errors.keys();
+        let letters = errors.filter_map(|error| Some(error.split_once(NO_AXIS)?.1.split_once(';')?.0));
+        letters.flat_map(|letters| letters.chars().filter(char::is_ascii_uppercase)).collect()
     }
 
     /// Returns the errors of the program and its travel excess as one page, or `None` for a valid program. A single error

@@ -309,7 +309,7 @@ fn programs_of_sinumerik() {
 
 #[test]
 fn programs_of_grbl() {
-    run(Dialect::Grbl, 20);
+    run(Dialect::Grbl, 90);
 }
 
 #[test]
@@ -319,7 +319,7 @@ fn programs_of_marlin() {
 
 #[test]
 fn programs_of_mach3() {
-    run(Dialect::Mach3, 40);
+    run(Dialect::Mach3, 70);
 }
 
 #[test]

@@ -104,3 +104,42 @@ fn other_formats_are_named_in_one_error() {
         assert!(is_g_code(text.as_bytes()), "{text:?}");
     }
 }
+
+/// Lines that repeat a canned cycle whose own line has an error would have consequences of it.
+#[test]
+fn an_error_of_a_canned_cycle_has_no_consequences_in_its_next_lines() {
+    for (dialect, cycle, expected) in [
+        (Dialect::LinuxCnc, "G83 X1 Y1 Z-3 R1 Q1 F100 G187", "G187 is not supported"),
+        (Dialect::LinuxCnc, "G83 X1 Y1 Z-3 R1 Q1", "feed missing"),
+        (Dialect::LinuxCnc, "G81 X1 Z-3 R1 F100 V1", "word V"),
+        (Dialect::Fanuc, "G83 X1. Y1. Z-3. R1. Q1. F100. G477", "G477 is not supported"),
+    ] {
+        let text = format!("G21 G90 G17 G0 Z5.\n{cycle}\nX5.\nX9. Y2.\nG80\nG0 Z9.\nM2\n");
+        let options = InterpreterOptions {
+            dialect: Some(dialect),
+            reports_all_errors: true,
+            ..InterpreterOptions::default()
+        };
+        let mut interpreter = Interpreter::new(std::io::Cursor::new(text), "part.nc", options);
+        assert!(interpreter.by_ref().all(|step| step.is_ok()));
+        let errors = &interpreter.report().errors;
+        let [(error, found)] = &errors.iter().collect::<Vec<_>>()[..] else { panic!("{cycle}: {errors:?}") };
+        assert!(error.contains(expected) && found.count == 1 && found.first_line == 2, "{cycle}: {errors:?}");
+    }
+    // Each later line with the code of a cycle is executed again.
+    let text = "G21 G90 G17 G0 Z5\nG81 X1 Z-1 R1 F100 G187\nX3\nG81 X5 Z-1 R1 F100\nX6\nG80\nM2\n";
+    let options = InterpreterOptions {
+        dialect: Some(Dialect::LinuxCnc),
+        reports_all_errors: true,
+        ..InterpreterOptions::default()
+    };
+    let mut interpreter = Interpreter::new(std::io::Cursor::new(text), "part.nc", options);
+    let lines: std::collections::BTreeSet<_> = interpreter
+        .by_ref()
+        .filter_map(|step| match step {
+            Ok(ProgramStep::Motion(motion)) => Some(motion.line),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(lines.into_iter().collect::<Vec<_>>(), [1, 4, 5]);
+}

@@ -55,6 +55,8 @@ fn programs_run_in_their_detected_dialects() {
             "; Mach3\nG21\nG68 A0 B0 R90\nG0 X10 Y0\nG69\nG51 X2 Y3\nG0 X1 Y1\nG50\nM30\n",
             [2.0, 3.0, 0.0],
         ),
+        // Start of a printer's file before the words of a mill.
+        (Marlin, "M104 S210\nG28\nG90 E0\nG21\nG0 Z2\nG1 X3 F600\nG0 Z0\n", [3.0, 0.0, 0.0]),
         (LinuxCnc, "G21 G90 G64 P0.01\nM7\nM8\nG0 X1\nG1 X2 F100\nM9\nM2\n", [2.0, 0.0, 0.0]),
         (LinuxCnc, "#<r>=3\nG0 X#<r>\nM2\n", [3.0, 0.0, 0.0]),
         (

@@ -18,3 +18,4 @@ mod sinumerik;
 mod surface;
 mod survey;
 mod tool_center_point;
+mod turning;

@@ -5,6 +5,7 @@ pub mod program_text;
 pub mod setpoint_summary;
 
 use std::cell::{Cell, RefCell};
+use std::collections::BTreeSet;
 use std::error::Error;
 use std::fs;
 use std::io::Read;
@@ -12,11 +13,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::arguments::log_arguments::LogArguments;
-use crate::builtin::{PROGRAM_DESCRIPTIONS, PROGRAMS, SCENARIOS};
+use crate::builtin::{MACHINES, PROGRAM_DESCRIPTIONS, PROGRAMS, SCENARIOS};
 use crate::output::progress::TrialProgress;
 use crate::output::{interrupt, print_error};
 use part_program::{PartProgramArguments, count_lines, is_part_program, open_other};
-use virtual_axes_core::config::MachineConfig;
+use virtual_axes_core::config::{MachineConfig, Parameters};
 use virtual_axes_core::path::Program;
 use virtual_axes_core::scenario::{Scenario, ScenarioError, nearest_input};
 use virtual_axes_core::simulation::joint_limits;
@@ -311,7 +312,12 @@ impl CommandInput {
         })?;
         self.is_surveyed.set(true);
         match survey.page(&self.name, machine) {
-            Some(page) => {
+            Some(mut page) => {
+                if let Some(name) = machine_with(machine, &survey.missing_axes()) {
+                    page += &format!(
+                        "\na built-in machine with these axes as a template: virtual_axes machines --new {name} > mine.yaml"
+                    );
+                }
                 for (line, note) in survey.notes() {
                     print_error(&format!("note: {}:{line}: {note}", self.name));
                 }
@@ -329,6 +335,22 @@ impl CommandInput {
             error => format!("{}: {error}", self.name).into(),
         }
     }
+}
+
+/// Returns the built-in machine with the fewest axes that has those of `machine` and the missing ones; `None` without a
+/// missing one.
+fn machine_with(machine: &MachineConfig, missing: &BTreeSet<char>) -> Option<&'static str> {
+    let axes = |machine: &MachineConfig| -> BTreeSet<String> {
+        machine.axes().iter().map(|axis| axis.name().to_ascii_uppercase()).collect()
+    };
+    let mut wanted = axes(machine);
+    wanted.extend(missing.iter().map(char::to_string));
+    let candidate = |name: &'static str| {
+        let found = axes(&Parameters::load(name, MACHINES).ok()?.machine_config().ok()?);
+        found.is_superset(&wanted).then_some((found.len(), name))
+    };
+    let candidates = MACHINES.iter().filter(|_| !missing.is_empty()).filter_map(|(name, _)| candidate(name));
+    candidates.min_by_key(|(count, _)| *count).map(|(_, name)| name)
 }
 
 /// Adds the built-in part programs to the error of a name that is not known.

@@ -41,7 +41,15 @@ impl DeepHole {
         let depth = (reference - bottom).abs();
         let first = match (values.get(5)?, values.get(6)?.filter(|first| *first != 0.0)) {
             (_, Some(first)) => first.abs() * values.length,
-            (Some(first), None) => (reference - first * values.length).abs(),
+            (Some(first), None) => {
+                let first = (reference - first * values.length) * (reference - bottom).signum();
+                if first < 0.0 {
+                    return Err("CYCLE83: FDEP, its value 6, is above the reference plane: the first drilling depth must \
+                                lie between the reference plane and the depth (alarm 61107 of the control)"
+                        .to_owned());
+                }
+                first
+            }
             (None, None) => depth,
         };
         let degression = values.get(7)?.unwrap_or(0.0);

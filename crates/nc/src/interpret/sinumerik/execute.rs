@@ -409,6 +409,10 @@ impl Sinumerik {
                 false => reject(&name, keywords::g_remedy(*code), state)?,
             }
         }
+        if words.g.iter().any(|code| matches!(code, 33..=35 | 335 | 336)) {
+            // Pitch and start angle of a thread belong to its code.
+            ["I", "J", "K", "SF"].into_iter().for_each(|name| drop(words.take(name)));
+        }
         words.g.retain(is_known);
         Ok(())
     }

@@ -268,16 +268,15 @@ fn direction(
 
 /// Rejects words of axes that the machine lacks.
 fn require_axes(words: &Words, state: &State) -> Outcome<()> {
+    let mut missing = Vec::new();
     for (axis, letter) in AXIS_LETTERS.into_iter().enumerate() {
         // A rotary axis that the machine lacks may stay at 0.
         let moves = words.axes[axis].is_some_and(|(value, _)| !(3..6).contains(&axis) || value != 0.0);
         if moves && !state.options.axes[axis] {
-            let known = AXIS_LETTERS.into_iter().zip(state.options.axes).filter(|(_, has)| *has);
-            let known = known.map(|(letter, _)| letter.to_string()).collect::<Vec<_>>().join(" ");
-            return Err(format!("word {letter}: the machine has no axis {letter}; axes: {known}"));
+            missing.push(letter);
         }
     }
-    Ok(())
+    if missing.is_empty() { Ok(()) } else { Err(state.options.missing_axes(&missing)) }
 }
 
 /// Completes the end of a line by its angle ANG and one coordinate.

@@ -76,6 +76,9 @@ impl Sinumerik {
                 }
             }
         };
+        if direction != 0.0 && mode >> 6 & 3 != ROTARY_AXES {
+            require_travel(&angles, direction, state)?;
+        }
         state.finish_contour()?;
         self.retract(number(0), state)?;
         self.modes.frame = AxisFrame::default();
@@ -115,6 +118,35 @@ impl Sinumerik {
         end[3..6].copy_from_slice(&angles[3..6]);
         state.push_rapid(end)
     }
+}
+
+/// Rejects angles of which no solution is within the travel of the rotary axes, and notes a solution that is not the one of
+/// `direction` (`_DIR`): the control takes the other one, if one cannot be reached.
+fn require_travel(angles: &Coordinates, direction: f64, state: &mut State) -> Outcome<()> {
+    let Some(transform) = &state.options.kinematics else { return Ok(()) };
+    let other = transform.other_solution(angles);
+    let other_excess = other.map(|other| transform.rotary_excess(&other)).unwrap_or_default();
+    let excess = transform.rotary_excess(angles);
+    if !excess.is_empty() {
+        let other = if other_excess.is_empty() {
+            String::new()
+        } else {
+            format!("; of the other solution, {other_excess}")
+        };
+        return Err(format!(
+            "CYCLE800: the rotary axes do not reach this plane: {excess}{other}; no work offset helps: program another \
+             plane, clamp the workpiece in another way, or check on a machine with that travel"
+        ));
+    }
+    let is_against = transform.first_rotary_axis().is_some_and(|first| direction * angles[first] < 0.0);
+    if is_against && !other_excess.is_empty() {
+        let (taken, opposite) = (transform.rotary_text(angles), if direction < 0.0 { "1" } else { "-1" });
+        state.assume(format!(
+            "CYCLE800 with _DIR={direction}: {other_excess}; the other solution {taken} is taken, as on the control: \
+             that of _DIR={opposite}"
+        ));
+    }
+    Ok(())
 }
 
 /// Returns the rotation of angles about successive axes, whose order is in bits 0 to 5: X is 1, Y is 2, Z is 3.

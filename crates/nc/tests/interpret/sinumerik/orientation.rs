@@ -3,8 +3,8 @@
 use nalgebra::{Rotation3, Vector3};
 use virtual_axes_core::config::{MachineConfig, Parameters, ValueSource};
 use virtual_axes_core::kinematics::{Kinematics, ToolPose};
-use virtual_axes_nc::interpret::{Dialect, InterpreterOptions, TipTransform};
-use virtual_axes_nc::motion::{MotionKind, ProgramMotion};
+use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions, TipTransform};
+use virtual_axes_nc::motion::{MotionKind, ProgramMotion, ProgramStep};
 
 use crate::common::{motions, steps};
 
@@ -190,6 +190,45 @@ fn the_sign_of_a_swivel_belongs_to_the_first_rotary_axis() {
         assert_eq!(angles[1], 0.0, "a machine without B");
         assert_pose(&pose(&last, 1.0), [0.0, 10.0 * sine, 10.0 * cosine], Vector3::new(0.0, sine, cosine));
     }
+}
+
+/// The table A of the machine turns from −30° to 120°.
+#[test]
+fn a_swivel_beyond_the_travel_names_limit_and_solution() {
+    let swivel = |angle: i32, direction: i32| {
+        let text =
+            format!("D1\nCYCLE800(1,\"\",0,57,0,0,0,{angle},0,0,0,0,0,{direction})\nG0 X0 Y0 Z10\nM30\n");
+        let mut interpreter = Interpreter::new(std::io::Cursor::new(text), "part.nc", options());
+        let steps: Result<Vec<_>, _> = interpreter.by_ref().collect();
+        let notes: Vec<_> = interpreter.report().assumptions.keys().cloned().collect();
+        (steps.map_err(|error| error.to_string()), notes.join("\n"))
+    };
+    // −60° about X: A is 60° with half a turn of C, or −60°, which is beyond the travel.
+    let (steps, notes) = swivel(-60, -1);
+    let end = steps.expect("the other solution").into_iter().rev().find_map(|step| match step {
+        ProgramStep::Motion(motion) => Some(motion.end),
+        ProgramStep::Event { .. } => None,
+    });
+    assert!((end.expect("a motion")[3].to_degrees() - 60.0).abs() < 1e-9);
+    let (_, rest) =
+        notes.split_once("CYCLE800 with _DIR=-1: A -60° is beyond its travel of -30° to 120°").expect(&notes);
+    assert!(rest.contains("the other solution A 60° C") && rest.contains("_DIR=1"), "{notes}");
+    let (steps, notes) = swivel(-60, 1);
+    assert!(steps.is_ok() && !notes.contains("CYCLE800"), "{notes}");
+    // Both solutions are beyond it.
+    for direction in [-1, 1] {
+        let error = swivel(-130, direction).0.expect_err("no solution");
+        for part in [
+            "part.nc:2: CYCLE800: the rotary axes do not reach this plane",
+            "A -130° is beyond its travel of -30° to 120°",
+            "A 130° is beyond its travel of -30° to 120°",
+            "no work offset helps",
+        ] {
+            assert!(error.contains(part), "{part}: {error}");
+        }
+    }
+    // Without a motion of the rotary axes the frame alone is turned.
+    assert!(swivel(-130, 0).0.is_ok());
 }
 
 #[test]

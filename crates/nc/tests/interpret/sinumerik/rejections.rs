@@ -93,6 +93,16 @@ fn all_words_are_reported_at_once() {
 }
 
 #[test]
+fn words_of_a_thread_that_is_rejected_are_no_errors_of_their_own() {
+    let options = InterpreterOptions { reports_all_errors: true, ..options() };
+    let text = "G0 X5 Y5 Z5\nG1 Z4 F100\nG33 Z-30 K1.5 SF=0\nG0 Z20\nM30\n";
+    let mut steps = Interpreter::new(Cursor::new(text), "part.mpf", options);
+    assert!(steps.by_ref().all(|step| step.is_ok()));
+    let errors: Vec<_> = steps.report().errors.keys().collect();
+    assert!(matches!(&errors[..], [error] if error.starts_with("G33 is not supported")), "{errors:?}");
+}
+
+#[test]
 fn errors_of_loops_and_files_end_a_report_of_all() {
     // Each of these would repeat its error without end.
     for text in [
