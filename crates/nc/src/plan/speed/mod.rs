@@ -39,7 +39,7 @@ const MIN_GUESS: f64 = 0.02;
 const GAP_GUESS: f64 = 0.5;
 const SLACK_GUESS: f64 = 0.3;
 /// Duality gap relative to the time at which the state is kept for the next solution of the same window.
-const GAP_MIDDLE: f64 = 0.02;
+const GAP_MIDDLE: f64 = 2e-3;
 /// Fraction of the way to the boundary per iteration: of slacks and multipliers, and of coefficients.
 const TO_BOUNDARY: f64 = 0.99;
 const COEFFICIENT_TO_ZERO: f64 = 0.7;
@@ -118,6 +118,7 @@ impl SpeedSolver {
 
     /// Sets the first guess, and returns its barrier.
     fn begin(&mut self, window: &Window<'_>, ties: &[f64; 2]) -> f64 {
+        self.middle.coefficients.clear();
         self.initialize(window);
         self.set_constraints(window);
         self.assemble(window, ties, None);
@@ -169,7 +170,7 @@ impl SpeedSolver {
                 self.keep_middle(barrier);
             }
             if dual <= 0.5 * gap && residual <= 0.1 {
-                barrier = barrier.min(0.15 * average);
+                barrier = barrier.min(0.3 * average);
             } else if dual <= 2.0 * gap {
                 barrier = barrier.min(0.5 * average);
             }
