@@ -131,6 +131,19 @@ impl IntervalMotion {
         PathState { u: state.u.clamp(0.0, self.length), ..state }
     }
 
+    /// Returns the state and the jerk at the fraction `part` of the length, or next to a standstill of the duration.
+    pub fn at_part(&self, part: f64) -> (PathState, f64) {
+        let state = match self.law {
+            Law::Quadratic { rate, acceleration, stiffness } => {
+                let u = part * self.length;
+                let b = rate * rate + u * (2.0 * acceleration + u * stiffness);
+                PathState { u, rate: b.max(0.0).sqrt(), acceleration: acceleration + u * stiffness }
+            }
+            _ => self.at(part * self.duration),
+        };
+        (state, self.jerk_at(&state))
+    }
+
     /// Returns the jerk of the path parameter in `state`.
     pub fn jerk_at(&self, state: &PathState) -> f64 {
         match self.law {

@@ -441,7 +441,7 @@ impl<'a> LookAhead<'a> {
             let Some(piece) = &entry.piece else { continue };
             for at in CHECKS {
                 let [acceleration, jerk] = self.load(piece, entry.from, motion, at);
-                let rate = motion.at(at * motion.duration).rate / intervals[i].cap;
+                let rate = motion.at_part(at).0.rate / intervals[i].cap;
                 factor = factor.min(1.0 / acceleration).min(jerk.powf(-2.0 / 3.0)).min(1.0 / (rate * rate));
             }
         }
@@ -466,19 +466,18 @@ impl<'a> LookAhead<'a> {
         is_within
     }
 
-    /// Returns the largest ratios of a joint's acceleration and jerk to its limits at the fraction `at` of a motion.
+    /// Returns the largest ratios of a joint's acceleration and jerk to its limits at [`IntervalMotion::at_part`] `at`.
     fn load(&self, piece: &Piece, from: f64, motion: &IntervalMotion, at: f64) -> [f64; 2] {
-        let t = at * motion.duration;
-        let state = motion.at(t);
-        let jerk = motion.jerk_at(&state);
+        let (state, jerk) = motion.at_part(at);
         let [_, q1, q2, q3] = self.model.joints(piece, from + state.u);
         let (v, a) = (state.rate, state.acceleration);
+        let (square, product, cube) = (v * v, 3.0 * v * a, v * v * v);
         let mut worst = [0.0_f64; 2];
-        for (j, bounds) in self.model.joints.iter().enumerate() {
-            let acceleration = q1[j] * a + q2[j] * v * v;
-            let jerk = q1[j] * jerk + 3.0 * q2[j] * v * a + q3[j] * v * v * v;
-            worst[0] = worst[0].max(acceleration.abs() / bounds.acceleration);
-            worst[1] = worst[1].max(jerk.abs() / bounds.jerk);
+        for (j, [inverse_acceleration, inverse_jerk]) in self.model.inverses.iter().enumerate() {
+            let acceleration = q1[j] * a + q2[j] * square;
+            let jerk = q1[j] * jerk + q2[j] * product + q3[j] * cube;
+            worst[0] = worst[0].max(acceleration.abs() * inverse_acceleration);
+            worst[1] = worst[1].max(jerk.abs() * inverse_jerk);
         }
         worst
     }

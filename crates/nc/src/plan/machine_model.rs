@@ -68,6 +68,8 @@ fn ramp_distance(rate: f64, acceleration: f64, jerk: f64) -> f64 {
 #[derive(Debug, Clone)]
 pub(super) struct MachineModel {
     pub joints: Vec<LimitsConfig>,
+    /// Inverse limits of acceleration and jerk of each joint.
+    pub inverses: Vec<[f64; 2]>,
     pub kinds: JointKinds,
     pub tip: Option<TipToJoints>,
     /// Largest centripetal acceleration of the tool path, m/s².

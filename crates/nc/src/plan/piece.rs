@@ -84,11 +84,17 @@ impl Piece {
             PieceCurve::Exact(curve) => curve.jet(u),
             PieceCurve::Corner(arc) => arc.jet(u),
             PieceCurve::Overlap(overlap) => overlap.jet(u),
-            PieceCurve::Cubic([_, d1, d2, d3]) => {
-                let mut jet = [self.point(u), [0.0; MAX_JOINTS], [0.0; MAX_JOINTS], *d3];
+            PieceCurve::Cubic([p, d1, d2, d3]) => {
+                let mut jet = [*p, [0.0; MAX_JOINTS], [0.0; MAX_JOINTS], *d3];
                 for i in 0..MAX_JOINTS {
+                    jet[0][i] += u * (d1[i] + u * (0.5 * d2[i] + u * d3[i] / 6.0));
                     jet[1][i] = d1[i] + u * (d2[i] + 0.5 * u * d3[i]);
                     jet[2][i] = d2[i] + u * d3[i];
+                }
+                if let Some(end) = self.end
+                    && u >= self.length
+                {
+                    jet[0] = end;
                 }
                 jet
             }

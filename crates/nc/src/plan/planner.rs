@@ -146,7 +146,8 @@ impl<'a> PartProgramPlanner<'a> {
         let chord = 8.0 * options.chord_error / (period * period);
         let centripetal = options.centripetal_acceleration.min(chord);
         let slowest = joints.iter().map(|j| j.acceleration / j.jerk).fold(0.0, f64::max);
-        let model = MachineModel { joints, kinds: axes.kinds.clone(), tip, centripetal };
+        let inverses = joints.iter().map(|joint| [1.0 / joint.acceleration, 1.0 / joint.jerk]).collect();
+        let model = MachineModel { joints, inverses, kinds: axes.kinds.clone(), tip, centripetal };
         let steps = Box::new(steps.map(|step| step.map_err(Into::into)));
         let control = *machine.control();
         let is_trapezoidal = control.profile == ControlProfile::LinuxCnc;
