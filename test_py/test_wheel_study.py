@@ -240,23 +240,36 @@ def modulus(machine: va.Machine) -> float:
 
 
 SEARCH = """
+import os
 import sys
+import time
+from pathlib import Path
 sys.path.insert(0, {folder!r})
 import virtual_axes_py as va
 from test_wheel_study import SEARCHED
 machine = va.Machine.from_yaml(open({machine!r}).read())
-found = va.optimize(
-    machine, va.scenario("corner-90"), SEARCHED, lambda figures: figures["contour_error_um"]["rms"],
-    trials=96, batch=8, storage={storage!r},
-)
+begun = Path({begun!r})
+
+def cost(figures):
+    # Neither search goes on before both have trials.
+    (begun / str(os.getpid())).touch()
+    end = time.monotonic() + 60
+    while len(list(begun.iterdir())) < 2:
+        assert time.monotonic() < end, "there is no other search"
+        time.sleep(0.01)
+    return figures["contour_error_um"]["rms"]
+
+found = va.optimize(machine, va.scenario("corner-90"), SEARCHED, cost, trials=96, batch=8, storage={storage!r})
 print(found.value)
 """
 
 
 def test_two_processes_share_a_search(machine: va.Machine, tmp_path: Path) -> None:
-    journal, file = tmp_path / "journal", tmp_path / "machine.yaml"
+    journal, file, begun = tmp_path / "journal", tmp_path / "machine.yaml", tmp_path / "begun"
     file.write_text(machine.to_yaml())
-    program = SEARCH.format(folder=str(Path(__file__).parent), machine=str(file), storage=str(journal))
+    begun.mkdir()
+    folder = str(Path(__file__).parent)
+    program = SEARCH.format(folder=folder, machine=str(file), storage=str(journal), begun=str(begun))
     searches = [subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) for _ in range(2)]
     try:
         values = [float(search.communicate(timeout=100)[0]) for search in searches]
