@@ -16,7 +16,7 @@ const ENOUGH: u32 = 4;
 /// Canned cycles for holes.
 const HOLES: [&str; 9] = ["G81", "G82", "G83", "G84", "G85", "G86", "G87", "G88", "G89"];
 /// Turning cycles of Sinumerik.
-const SINUMERIK: [&str; 13] = [
+const SINUMERIK: [&str; 12] = [
     "CYCLE93(",
     "CYCLE94(",
     "CYCLE95(",
@@ -28,7 +28,6 @@ const SINUMERIK: [&str; 13] = [
     "CYCLE950(",
     "CYCLE951(",
     "CYCLE952(",
-    "LIMS=",
     "DIAMON",
 ];
 
@@ -57,7 +56,7 @@ const KINDS: [(u32, &str); 12] = [
     (ENOUGH, "a turning cycle of Sinumerik"),
     (3, "G76 with P and Q, a threading cycle"),
     (2, "a tool with its offset, as in T0101"),
-    (2, "the speed limit G50 S or G92 S"),
+    (2, "the speed limit G50 S, G92 S or LIMS"),
     (2, "G96, constant surface speed"),
     (2, "G99 without a canned cycle, feed per revolution"),
     (2, "increments U and W beside X and Z"),
@@ -108,12 +107,15 @@ impl Evidence {
     fn add(&mut self, code: &str, number: usize, dialect: Dialect) {
         if dialect == Dialect::Sinumerik {
             if let Some(word) = SINUMERIK.into_iter().find(|word| has_name(code, word)) {
-                self.found[NAMED_CYCLE].get_or_insert((number, word.trim_end_matches(['(', '='])));
+                self.found[NAMED_CYCLE].get_or_insert((number, word.trim_end_matches('(')));
             }
             let has = |letter: char, name: &str| has_letter(code, letter) || has_name(code, name);
             (self.has_x, self.has_z) = (self.has_x || has('X', "X="), self.has_z || has('Z', "Z="));
             self.has_mill_words |=
                 has('Y', "Y=") || has('A', "A=") || has('B', "B=") || code.contains("CYCLE");
+            if has_name(code, "LIMS=") {
+                self.found[SPEED_LIMIT].get_or_insert((number, KINDS[SPEED_LIMIT].1));
+            }
             for (kind, word) in
                 [(SURFACE_SPEED, "G96"), (PLANE, "G18"), (FEED_PER_REVOLUTION, "G95"), (THREAD, "G33")]
             {

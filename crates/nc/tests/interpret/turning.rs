@@ -56,7 +56,7 @@ fn turning_programs_are_rejected_by_one_sentence() {
         // Thread and facing without a cycle.
         (2, "G96", "G18 G90 G95\nG96 S200 M4\nG0 X54 Z2\nG1 Z-40 F0.25\nG33 Z-50 K1.5 SF=0\nM30\n"),
         (3, "CYCLE95", "G18 G90 DIAMON\nT1 D1\nCYCLE95(\"KONTUR\",2,0.1,0.2,,0.3,0.2,0.15,9)\nM30\n"),
-        (2, "LIMS", "G18 G90 G95\nLIMS=3000\nG96 S200 M3\nG0 X40 Z2\nM30\n"),
+        (2, "the speed limit", "G18 G90 G95\nLIMS=3000\nG96 S200 M3\nG0 X40 Z2\nM30\n"),
     ] {
         let found = errors(text, Some(Dialect::Sinumerik));
         let [error] = &found[..] else { panic!("{text}: {found:?}") };
@@ -72,6 +72,8 @@ fn mills_with_words_of_turning_are_no_turning_programs() {
     for (dialect, text) in [
         (Dialect::Sinumerik, "G18 G90 G95 S500 M3\nG0 X10 Y5 Z20\nG2 X0 Z10 CR=10 F0.1\nG17\nM30\n"),
         (Dialect::Sinumerik, "G17 G90\nS500 M3\nG96 S200\nG0 Z=20\nG0 X10 Y=R1\nM30\n"),
+        // Facing at constant surface speed.
+        (Dialect::Sinumerik, "G17 G90\nLIMS=3000\nG96 S200 M3\nG0 X10 Y5 Z20\nG97 S800\nM30\n"),
         // Surface speed of a boring head, tools of four digits, speed limit.
         (
             Dialect::Fanuc,
