@@ -24,8 +24,8 @@ fn energy(axis: &AxisConfig, s: &DriveStates) -> f64 {
         + structure
 }
 
-/// Trajectories of a plant in the energy test: 1 million in all.
-const TRAJECTORIES: usize = 500;
+/// Trajectories of a plant in the energy test: 200 000 in all.
+const TRAJECTORIES: usize = 100;
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]

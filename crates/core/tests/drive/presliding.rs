@@ -196,8 +196,8 @@ fn the_stribeck_curve_is_that_of_its_formula() {
     assert_eq!(law.bound(0.0), axis.friction.i0);
 }
 
-/// Trajectories of a plant in the energy test: 1 million in all.
-const TRAJECTORIES: usize = 500;
+/// Trajectories of a plant in the energy test: 200 000 in all.
+const TRAJECTORIES: usize = 100;
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]

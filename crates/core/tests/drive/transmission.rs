@@ -191,8 +191,8 @@ fn friction_and_load_are_those_of_a_small_step_integration() {
     }
 }
 
-/// Trajectories of a plant in the energy test: 1 million in all.
-const TRAJECTORIES: usize = 500;
+/// Trajectories of a plant in the energy test: 200 000 in all.
+const TRAJECTORIES: usize = 100;
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
