@@ -28,8 +28,9 @@ const CORNER_WEIGHT: f64 = 0.1;
 const SPLIT_PART: f64 = 0.4;
 /// Difference of the tool tip from the coordinates that counts as the same on all lines, m.
 const SAME: f64 = 1e-8;
-/// Largest difference of an end of a motion from the planned one after rounding, m and rad.
+/// Largest difference of an end of a motion from the planned one after rounding, m, and rad.
 const ROUNDING: f64 = 4e-7;
+const ROTARY_ROUNDING: f64 = 1e-6;
 /// Sweep of a whole turn, and the least one of an arc whose radius is corrected, rad.
 const WHOLE_TURN: f64 = TAU - 1e-6;
 const LEAST_SWEEP: f64 = 0.2;
@@ -240,7 +241,10 @@ impl ProgramModel {
                 _ => CutShape::Line,
             };
             let mut places = vec![1.0];
-            if let (CutShape::Line, PathControl::Blend(_), true) = (shape, motion.path_control, is_shifted) {
+            // A control that overlaps motions of rotary axes is slower with more of them.
+            let turns = (0..AXIS_COUNT).any(|axis| is_rotary(axis) && motion.start[axis] != motion.end[axis]);
+            let is_split = is_shifted && !turns;
+            if let (CutShape::Line, PathControl::Blend(_), true) = (shape, motion.path_control, is_split) {
                 let length = (direction(motion, true).1).norm();
                 let near: Vec<f64> = distances
                     .iter()
@@ -283,6 +287,14 @@ impl ProgramModel {
             shifts: vec![Vector3::zeros(); self.nodes.len()],
             radii: vec![0.0; self.pieces.len()],
             feeds: vec![1.0; self.pieces.len()],
+        }
+    }
+
+    /// Returns the programmed feed of a piece, m/s; infinite where it is no speed.
+    pub fn feed(&self, piece: usize) -> f64 {
+        match self.motions[self.pieces[piece].motion].0.feed {
+            Feed::Linear(feed) => feed,
+            _ => f64::INFINITY,
         }
     }
 
@@ -509,7 +521,10 @@ impl ProgramModel {
             };
             for (end, piece) in ends {
                 let Some((new, _)) = found.next() else { return Err(last) };
-                let is_near = end.iter().zip(&new.end).all(|(wanted, end)| (wanted - end).abs() < ROUNDING);
+                let is_near = end.iter().zip(&new.end).enumerate().all(|(axis, (wanted, end))| {
+                    let rounding = if is_rotary(axis) { ROTARY_ROUNDING } else { ROUNDING };
+                    (wanted - end).abs() < rounding
+                });
                 let is_same = std::mem::discriminant(&motion.kind) == std::mem::discriminant(&new.kind)
                     && motion.path_control == new.path_control
                     && motion.tcp_length == new.tcp_length;

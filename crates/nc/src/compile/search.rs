@@ -265,11 +265,13 @@ impl Search<'_> {
             }
             let before: BTreeSet<usize> = worst.iter().map(|piece| piece.saturating_sub(1)).collect();
             let around: BTreeSet<usize> = worst.iter().flat_map(|&piece| self.around(piece, 1)).collect();
+            let reached = self.reached_feeds(&best);
             let mut next = None;
             for (pieces, factor) in [(&before, SLOWER), (&around, SLOWER), (&around, SLOWER.sqrt())] {
                 let mut changes = best.changes.clone();
                 for piece in pieces {
-                    changes.feeds[*piece] = (changes.feeds[*piece] * factor).max(SLOWEST);
+                    let feed = changes.feeds[*piece].min(reached[*piece]);
+                    changes.feeds[*piece] = (feed * factor).max(SLOWEST);
                 }
                 next = self
                     .candidate(changes)?
@@ -284,6 +286,22 @@ impl Search<'_> {
             }
         }
         self.with_raised_feeds(best)
+    }
+
+    /// Returns the largest feed that the nominal plant reaches on each piece, relative to the programmed one: limits of the
+    /// axes can keep it below, and a feed above it has no effect.
+    fn reached_feeds(&self, candidate: &Candidate) -> Vec<f64> {
+        let mut reached = vec![0.0; self.model.pieces.len()];
+        let Some(nominal) = candidate.runs.plants.first() else { return reached };
+        for cycle in nominal.tips.windows(2) {
+            let line = cycle[1].0;
+            if let Some(Some(piece)) = candidate.program.pieces.get(line.wrapping_sub(1)) {
+                let feed =
+                    (cycle[1].1 - cycle[0].1).norm() / self.simulator.period() / self.model.feed(*piece);
+                reached[*piece] = feed.max(reached[*piece]);
+            }
+        }
+        reached
     }
 
     /// Raises feeds up to the limit, and lowered ones again, where the errors allow it.

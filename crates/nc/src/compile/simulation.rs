@@ -9,6 +9,7 @@ use std::thread;
 use nalgebra::Vector3;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_core::trial::{self, GridRows, GridSource, Measures, SetpointSource, Trial, TrialError};
+use virtual_axes_core::units::seconds;
 
 use super::error::CompileError;
 use crate::offline::{LineErrors, PartProgramOptions, PartProgramSource, ProgramTrack, ProgrammedErrors};
@@ -72,6 +73,11 @@ impl Runs {
 }
 
 impl Simulator<'_> {
+    /// Returns the position cycle, s.
+    pub fn period(&self) -> f64 {
+        self.plants.first().map_or(f64::INFINITY, |machine| seconds(machine.periods().position))
+    }
+
     /// Plans a program, which is the same for all plants.
     ///
     /// # Errors
