@@ -627,3 +627,24 @@ fn a_chamfer_by_macro_b_has_circles_of_growing_radius() {
     assert_eq!(circles.len(), 3);
     assert!(circles.iter().all(|sweep| (sweep - 2.0 * std::f64::consts::PI).abs() < 1e-9), "{circles:?}");
 }
+
+#[test]
+fn words_of_macros_are_abbreviated_to_two_letters_and_more() {
+    // WHILE, END, GOTO, THEN and functions, as a control of Fanuc completes them.
+    let text = "O1\nG21G90G0X0Y0Z0\n#1=0\nWH[#1LT3]DO1\nG0X[#1*10.+1.]\n#1=#1+1\nEN1\nG0YCO[60.]\nG0Y[SQ[16.]+RO[1.4]]\n\
+                IF[[#1EQ3]AN[1EQ1]]GO5\nG0X99.\nN5IF[#1EQ3]TH#2=7.\nG0Z#2\nG28XY\nM30\n";
+    let expected = [
+        [1.0, 0.0, 0.0],
+        [11.0, 0.0, 0.0],
+        [21.0, 0.0, 0.0],
+        [21.0, 0.5, 0.0],
+        [21.0, 5.0, 0.0],
+        [21.0, 5.0, 7.0],
+        [0.0, 0.0, 7.0],
+    ];
+    assert_ends(Dialect::Fanuc, text, &expected);
+    // Haas has the whole words only.
+    let error =
+        steps("O1\n#1=0\nWH[#1LT3]DO1\nEN1\n", options(Dialect::Haas)).expect_err("no word").to_string();
+    assert!(error.starts_with("part.nc:3: "), "{error}");
+}
