@@ -419,6 +419,10 @@ impl State {
             "_spindle_rpm_mode" | "_lathe_radius_mode" | "_feed_override" | "_speed_override" => Some(1.0),
             "_vmajor" => Some(2.9),
             "_vminor" => Some(0.0),
+            // Diameter of the tool in the spindle.
+            5410 => Some(
+                self.options.tools.get(self.modal.tool).map_or(0.0, |tool| 2.0 * tool.radius / MILLIMETER),
+            ),
             "_retract_old_z" => flag(modal.retracts_to_initial),
             "_retract_r_plane" => flag(!modal.retracts_to_initial),
             "_motion_mode" => Some(f64::from(modal.motion.unwrap_or(Motion::Cancel).number())),
