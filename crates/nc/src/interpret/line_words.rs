@@ -2,7 +2,7 @@
 
 use virtual_axes_core::units::Rounded;
 
-use super::codes::g_name;
+use super::codes::{Motion, g_name};
 use super::dialect::Dialect;
 use super::error::Outcome;
 use super::expression::{Scanner, Target};
@@ -164,10 +164,11 @@ impl LineWords {
             }
             // Analog outputs of LinuxCNC have the word E.
             b'e' if !state.dialect.has_macro_b() && !self.m.iter().any(|code| matches!(code, 66..=68)) => {
-                return Err(format!(
-                    "{word}: the letter E is not supported, the extruder of a printer or the work offset of Fadal \
-                     format 1; numbers have no exponent"
-                ));
+                return Err(
+                    "word E: the letter E is not supported, the extruder of a printer or the work offset of \
+                            Fadal format 1; numbers have no exponent"
+                        .to_owned(),
+                );
             }
             _ => {
                 let bit = 1 << index(letter);
@@ -267,9 +268,14 @@ impl LineWords {
         let codes = codes.collect::<Vec<_>>().join(" ");
         let codes = if codes.is_empty() { "without a code".to_owned() } else { format!("with {codes}") };
         Err(format!(
-            "word {letter} has no effect in this line {codes}: remove it, or program the code that it belongs to"
+            "word {letter} has no effect in this line {codes}: remove it, or program the code that it belongs to{hint}"
         ))
     }
+        let hint = match letter {
+            'L' if codes.is_empty() => "; the subprograms of Fadal format 1 are not supported",
+            'R' if self.g.contains(&Motion::Line.number()) => "; a rounded corner is ,R",
+            _ => "",
+        };
 }
 
 fn index(letter: u8) -> usize {
