@@ -9,6 +9,8 @@ use super::okuma::WORK_OFFSETS;
 use super::state::State;
 use crate::motion::{AXIS_COUNT, Plane, ProgramEvent, is_rotary};
 
+/// Variable that raises an alarm.
+pub(super) const ALARM: usize = 3000;
 /// Number of work coordinate systems.
 const SYSTEMS: usize = WORK_OFFSET_COUNT + ADDITIONAL_OFFSET_COUNT;
 
@@ -129,7 +131,7 @@ impl State {
     pub(super) fn set_control_variable(&mut self, number: usize, value: f64) -> Outcome<()> {
         let known = if value.is_nan() { 0.0 } else { value };
         match (number, quantity(number)) {
-            (3000, _) => {
+            (ALARM, _) => {
                 // The control stops.
                 self.has_ended = true;
                 return Err(format!("alarm of the program: #3000={known}"));

@@ -26,6 +26,7 @@ impl State {
     /// Executes a line; its steps are appended to `steps`.
     pub(super) fn execute(&mut self, block: &mut LineWords) -> Outcome<()> {
         self.set_parameters(block)?;
+        self.note_vacant(block.vacant.take());
         if self.spline.is_some() && block.is_ignored() {
             return Ok(());
         }
@@ -61,6 +62,7 @@ impl State {
             self.has_failed_cycle = codes.g.motion.is_some_and(is_canned);
         }
         if self.dialect == Dialect::Grbl {
+            self.note_grbl(block, &codes);
             // F has the units of its line.
             self.set_plane_and_units(block, &codes);
         }
@@ -117,6 +119,35 @@ impl State {
         block.require_used()
     }
 
+    /// Notes what other firmware of the kind of grbl accepts, and grbl 1.1 rejects.
+    fn note_grbl(&mut self, block: &LineWords, codes: &Codes) {
+        let is_dwell = codes.g.action == Some(Action::Dwell) && block.get('P').is_none();
+        for (is_found, text) in [
+            (
+                codes.m.tool_change.is_some(),
+                "M6: grbl 1.1 rejects it (error 20), a sender or grblHAL changes the tool",
+            ),
+            (codes.g.path_control == Some(PathControlCode::Blend), "G64: grbl 1.1 rejects it (error 20)"),
+            (is_dwell && block.get('S').is_some(), "G4 S: grbl 1.1 requires P, the dwell in s (error 28)"),
+        ] {
+            if is_found {
+                self.assume(text.to_owned());
+            }
+        }
+    }
+
+    /// Notes a word without effect, whose variable has no value, in the main program.
+    fn note_vacant(&mut self, vacant: Option<(char, usize)>) {
+        match vacant {
+            None | Some((_, 0)) => {}
+            Some(('F', variable)) => self.vacant_feed = variable,
+            Some((letter, variable)) if self.calls == 0 => {
+                self.assume(format!("word {letter} has no effect: {}", self.value_source(variable)));
+            }
+            Some(_) => {}
+        }
+    }
+
     pub(super) fn set_parameters(&mut self, block: &mut LineWords) -> Outcome<()> {
         for (target, value) in block.settings.drain(..) {
             match target {
@@ -155,6 +186,7 @@ impl State {
             let units = if mode == FeedMode::InverseTime { [1.0; 2] } else { [self.modal.length, DEGREE] };
             self.modal.feed_word = feed;
             self.modal.feed = (feed > 0.0).then(|| units.map(|unit| feed * unit));
+            self.vacant_feed = 0;
         }
         Ok(())
     }

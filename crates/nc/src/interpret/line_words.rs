@@ -2,7 +2,7 @@
 
 use virtual_axes_core::units::Rounded;
 
-use super::codes::g_name;
+use super::codes::{Motion, g_name};
 use super::dialect::Dialect;
 use super::error::Outcome;
 use super::expression::{Scanner, Target};
@@ -38,6 +38,8 @@ pub(super) struct LineWords {
     points: u32,
     /// True if letters are arguments of a macro: G65, G66.
     is_macro: bool,
+    /// Letter of a word without effect, whose variable, the number, has no value.
+    pub vacant: Option<(char, usize)>,
     /// Parameter settings, in their order.
     pub settings: Vec<(Setting, f64)>,
 }
@@ -55,7 +57,7 @@ impl LineWords {
     /// Reads a compact line.
     pub(super) fn read(&mut self, text: &[u8], state: &State) -> Outcome<()> {
         (self.given, self.unused, self.points, self.corner, self.is_macro) = (0, 0, 0, None, false);
-        self.polar = [None; 2];
+        (self.polar, self.vacant) = ([None; 2], None);
         self.g.clear();
         self.m.clear();
         self.settings.clear();
@@ -124,7 +126,10 @@ impl LineWords {
             .word_value()
             .map_err(|reason| format!("word {}: {reason}", char::from(letter.to_ascii_uppercase())))?;
         // A word with a parameter without value has no effect.
-        let Some(value) = value else { return Ok(()) };
+        let Some(value) = value else {
+            self.vacant = Some((letter.to_ascii_uppercase().into(), state.vacant.take()));
+            return Ok(());
+        };
         match letter {
             b'g' => {
                 require_count(self.g.len(), "G codes")?;
@@ -164,10 +169,11 @@ impl LineWords {
             }
             // Analog outputs of LinuxCNC have the word E.
             b'e' if !state.dialect.has_macro_b() && !self.m.iter().any(|code| matches!(code, 66..=68)) => {
-                return Err(format!(
-                    "{word}: the letter E is not supported, the extruder of a printer or the work offset of Fadal \
-                     format 1; numbers have no exponent"
-                ));
+                return Err(
+                    "word E: the letter E is not supported, the extruder of a printer or the work offset of \
+                            Fadal format 1; numbers have no exponent"
+                        .to_owned(),
+                );
             }
             _ => {
                 let bit = 1 << index(letter);
@@ -265,9 +271,14 @@ impl LineWords {
         let codes =
             self.g.iter().map(|code| g_name(*code)).chain(self.m.iter().map(|code| format!("M{code}")));
         let codes = codes.collect::<Vec<_>>().join(" ");
+        let hint = match letter {
+            'L' if codes.is_empty() => "; the subprograms of Fadal format 1 are not supported",
+            'R' if self.g.contains(&Motion::Line.number()) => "; a rounded corner is ,R",
+            _ => "",
+        };
         let codes = if codes.is_empty() { "without a code".to_owned() } else { format!("with {codes}") };
         Err(format!(
-            "word {letter} has no effect in this line {codes}: remove it, or program the code that it belongs to"
+            "word {letter} has no effect in this line {codes}: remove it, or program the code that it belongs to{hint}"
         ))
     }
 }

@@ -43,6 +43,7 @@ mod tools;
 mod turning;
 mod work_offset;
 
+use std::collections::BTreeSet;
 use std::io::{BufRead, Seek};
 use std::path::Path;
 
@@ -55,16 +56,17 @@ pub use error::ProgramError;
 pub use ignored::{CodePattern, IgnoredCodes};
 pub use limits::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
 pub use line_modes::LineModes;
-pub(crate) use options::NO_AXIS;
 pub use options::{InterpreterOptions, TipTransform};
 pub use report::{InterpretationReport, OccurrenceTable, Occurrences};
 pub use tools::{Tool, ToolTable};
 pub use work_offset::WorkOffset;
 pub use work_offset::system_name;
 
+use self::control_variables::ALARM;
 use self::error::Outcome;
-use self::line_words::LineWords;
+use self::line_words::{LineWords, Setting};
 use self::o_words::{Flow, is_o_word};
+use self::parameters::LOCALS;
 use self::sinumerik::Sinumerik;
 use self::source::{LineSource, SourceHead};
 use self::state::State;
@@ -129,6 +131,11 @@ impl<R: BufRead + Seek> Interpreter<R> {
     /// Returns words without effect, assumptions and errors of the lines executed so far.
     pub fn report(&self) -> &InterpretationReport {
         &self.state.report
+    }
+
+    /// Returns the letters of the axes that the lines executed so far move and the machine lacks.
+    pub fn missing_axes(&self) -> BTreeSet<char> {
+        self.state.missing_axes.borrow().clone()
     }
 
     /// Returns true if the motions of the last line are in machine coordinates: G28, G30, G53.
@@ -251,8 +258,23 @@ impl<R: BufRead + Seek> Interpreter<R> {
             self.state.note_without_effect(code);
             self.block.is_ignored_line = true;
         }
-        self.state.execute(&mut self.block)?;
+        let is_alarm = self.state.dialect.has_macro_b()
+            && self.block.settings.iter().any(|(target, _)| *target == Setting::Number(ALARM));
+        let result = self.state.execute(&mut self.block);
+        result.map_err(|reason| if is_alarm { reason + &self.alarm_cause() } else { reason })?;
         self.execute_jump()
+    }
+
+    /// Returns the comment of the alarm in the line, and the argument that a macro lacks.
+    fn alarm_cause(&self) -> String {
+        let raw = String::from_utf8_lossy(&self.line.raw);
+        let comment = raw.split_once('(').map(|(_, rest)| rest.split(')').next().unwrap_or_default());
+        let mut cause = comment.map_or(String::new(), |comment| format!(" ({comment})"));
+        let vacant = self.state.vacant.get();
+        if (1..=LOCALS).contains(&vacant) && self.state.calls == 0 {
+            cause += &format!("; {}", self.state.value_source(vacant));
+        }
+        cause
     }
 }
 

@@ -348,6 +348,9 @@ impl State {
         let mode = self.modal.feed_mode;
         let Some([linear, rotary]) = self.modal.feed else {
             return Err(match mode {
+                _ if self.vacant_feed != 0 => {
+                    format!("feed missing: word F: {}", self.value_source(self.vacant_feed))
+                }
                 FeedMode::InverseTime => {
                     "feed missing: G93 requires F in each line with G1, G2 or G3".to_owned()
                 }

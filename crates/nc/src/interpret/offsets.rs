@@ -133,7 +133,7 @@ impl State {
             }
             values[axis] = Some(value * self.unit(axis));
         }
-        if missing.is_empty() { Ok(values) } else { Err(self.options.missing_axes(&missing)) }
+        if missing.is_empty() { Ok(values) } else { Err(self.reject_axes(&missing)) }
     }
 
     /// Sets offsets and tools: G10 L1, L10 to L13 (tools), L2 (work offset), L20 (coordinates of the position, or

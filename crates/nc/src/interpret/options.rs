@@ -17,8 +17,6 @@ use super::tools::ToolTable;
 use super::work_offset::WorkOffset;
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Blend, Coordinates, PathControl};
 
-/// Text before the letters of axes that the machine lacks, up to a semicolon.
-pub(crate) const NO_AXIS: &str = "the machine has no axis ";
 /// Difference of two directions, and of an angle from its travel limit, that is rounding, rad.
 const SAME_DIRECTION: f64 = 1e-9;
 
@@ -140,14 +138,6 @@ impl InterpreterOptions {
         self.set_tools(tools);
         (self.tool_change_time, self.spindle_time) = (setup.tool_change_time, setup.spindle_time);
         Ok(self)
-    }
-
-    /// Returns the error of words of axes that the machine lacks.
-    pub(super) fn missing_axes(&self, letters: &[char]) -> String {
-        let known = AXIS_LETTERS.into_iter().zip(self.axes).filter(|(_, has)| *has);
-        let known = known.map(|(letter, _)| letter.to_string()).collect::<Vec<_>>().join(" ");
-        let missing = letters.iter().map(char::to_string).collect::<Vec<_>>().join(" ");
-        format!("word {missing}: {NO_AXIS}{missing}; axes: {known}")
     }
 
     /// Sets a work offset, which counts as given.

@@ -1,6 +1,7 @@
 //! State of the interpreter between lines: position, offsets and modes.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::cell::{Cell, RefCell};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use nalgebra::{Matrix3, Vector3};
 use virtual_axes_core::text::escaped;
@@ -78,6 +79,12 @@ pub(super) struct State {
     pub enters_parameters: bool,
     /// True after the program end.
     pub has_ended: bool,
+    /// Letters of the axes that the program moves and the machine lacks.
+    pub missing_axes: RefCell<BTreeSet<char>>,
+    /// Variable of macro B without value that was read last; 0 without one.
+    pub vacant: Cell<usize>,
+    /// Variable without value that an F word has read, as long as no feed is programmed; 0 without one.
+    pub vacant_feed: usize,
 }
 
 /// Jump of the subprograms that are called by number.
@@ -260,6 +267,9 @@ impl State {
             moves_in_machine_coordinates: false,
             enters_parameters: false,
             has_ended: false,
+            missing_axes: RefCell::default(),
+            vacant: Cell::new(0),
+            vacant_feed: 0,
             options,
         }
     }
@@ -284,6 +294,25 @@ impl State {
     /// Returns the programmed coordinate of the position, in units of the program.
     pub(super) fn coordinate(&self, axis: usize) -> f64 {
         self.programmed()[axis] / self.unit(axis)
+    }
+
+    /// Returns the error of words of axes that the machine lacks.
+    pub(super) fn reject_axes(&self, letters: &[char]) -> String {
+        self.missing_axes.borrow_mut().extend(letters);
+        let known = AXIS_LETTERS.into_iter().zip(self.options.axes).filter(|(_, has)| *has);
+        let known = known.map(|(letter, _)| letter.to_string()).collect::<Vec<_>>().join(" ");
+        let missing = letters.iter().map(char::to_string).collect::<Vec<_>>().join(" ");
+        format!("word {missing}: the machine has no axis {missing}; axes: {known}")
+    }
+
+    /// Returns what gives a variable of macro B its value, for a message.
+    pub(super) fn value_source(&self, variable: usize) -> String {
+        let has_arguments = variable <= LOCALS && self.calls == 0;
+        let source = match has_arguments {
+            true => "a macro with arguments runs by the program that calls it, as with G65 P9010 X10",
+            false => "set it at the start of the program to its value in the control",
+        };
+        format!("#{variable} has no value: {source}")
     }
 
     /// Adds an assumption to the report.
@@ -390,6 +419,10 @@ impl State {
             5221..=5389 => value(self.options.work_offsets.get(system)?, 5221 + 20 * system),
             5400 => Some(f64::from(self.modal.tool)),
             5401..=5409 => tool.get(number - 5401).map(|length| length / MILLIMETER).or(Some(0.0)),
+            // Diameter of the tool in the spindle.
+            5410 => Some(
+                self.options.tools.get(self.modal.tool).map_or(0.0, |tool| 2.0 * tool.radius / MILLIMETER),
+            ),
             5420..=5428 => Some(self.coordinate(number - 5420)),
             5601..=5602 => None,
             _ => Some(self.parameters.of_control(number).unwrap_or(0.0)),
@@ -456,12 +489,19 @@ impl State {
     /// Returns the value of `#number`.
     pub(super) fn numbered(&self, number: usize) -> Outcome<f64> {
         if self.dialect.has_macro_b() && number >= FIRST_VARIABLE_OF_CONTROL {
-            return Ok(self.control_variable(number));
+            let value = self.control_variable(number);
+            if value.is_nan() {
+                self.vacant.set(number);
+            }
+            return Ok(value);
         }
         let value = match number < FIRST_OF_CONTROL {
             true => self.parameters.numbered(number),
             false => self.control_parameter(number),
         };
+        if number != 0 && value.is_some_and(f64::is_nan) {
+            self.vacant.set(number);
+        }
         value.ok_or_else(|| format!("#{number} is not supported; supported: #1 to #5600"))
     }
 

@@ -7,6 +7,12 @@ use super::dialect::Dialect;
 use super::error::Outcome;
 use super::okuma;
 
+/// Words of macros that Fanuc abbreviates.
+const WORDS_OF_MACROS: [&str; 17] = [
+    "while", "goto", "then", "end", "xor", "and", "sin", "asin", "cos", "acos", "tan", "atan", "sqrt", "abs",
+    "fix", "fup", "round",
+];
+
 /// Line of a program without comments and blanks.
 #[derive(Debug, Default)]
 pub(super) struct LineText {
@@ -85,7 +91,40 @@ impl LineText {
             self.number = okuma::translate(&mut self.text)?;
             return Ok(());
         }
-        self.remove_number()
+        self.remove_number()?;
+        if dialect == Dialect::Fanuc {
+            self.expand_words_of_macros();
+        }
+        Ok(())
+    }
+
+    /// Completes the words of macros that Fanuc abbreviates to two letters and more, as in `WH[#1LT3]DO1`.
+    fn expand_words_of_macros(&mut self) {
+        let mut at = 0;
+        while let Some(start) = self.text[at..].iter().position(u8::is_ascii_alphabetic) {
+            let start = at + start;
+            let letters = self.text[start..].iter().take_while(|byte| byte.is_ascii_alphabetic()).count();
+            at = start + letters;
+            if letters < 2 {
+                continue;
+            }
+            // An address may stand before a function: `XCO[#1]`.
+            for begin in [start, start + 1] {
+                let part = &self.text[begin..at];
+                let next = self.text.get(at).copied().unwrap_or_default();
+                let is_part = |word: &&&str| {
+                    let takes_number = matches!(**word, "goto" | "then" | "end" | "xor" | "and");
+                    let may_follow =
+                        next == b'[' || (takes_number && (next == b'#' || next.is_ascii_digit()));
+                    may_follow && part.len() > 1 && word.as_bytes().starts_with(part)
+                };
+                if let Some(word) = WORDS_OF_MACROS.iter().find(is_part) {
+                    self.text.splice(begin..at, word.bytes());
+                    at = begin + word.len();
+                    break;
+                }
+            }
+        }
     }
 
     /// Removes the line number N.

@@ -60,7 +60,7 @@ const KINDS: [(u32, &str); 12] = [
     (2, "G96, constant surface speed"),
     (2, "G99 without a canned cycle, feed per revolution"),
     (2, "increments U and W beside X and Z"),
-    (2, "G7, X as diameter"),
+    (2, "G7 or G8, X as diameter or radius"),
     (1, "G18, the plane ZX"),
     (1, "G95, feed per revolution"),
     (2, "G33, a thread"),
@@ -74,7 +74,7 @@ const SURFACE_SPEED: usize = 5;
 const PER_REVOLUTION: usize = 6;
 const INCREMENTS: usize = 7;
 const DIAMETER: usize = 8;
-// Of Sinumerik alone.
+// Of Sinumerik and LinuxCNC.
 const PLANE: usize = 9;
 const FEED_PER_REVOLUTION: usize = 10;
 const THREAD: usize = 11;
@@ -136,6 +136,7 @@ impl Evidence {
         self.has_mill_words |= y || cycle || ['A', 'B'].iter().any(|letter| has_letter(code, *letter));
         let [p, q, r, s, u, w] = ['P', 'Q', 'R', 'S', 'U', 'W'].map(|letter| has_letter(code, letter));
         let is_contour = p && q && !x && !z && !r && !has_letter(code, 'I');
+        let is_linuxcnc = dialect == Dialect::LinuxCnc;
         let tests = [
             (
                 CONTOUR_CYCLE,
@@ -147,7 +148,10 @@ impl Evidence {
             (SURFACE_SPEED, has_word(code, "G96")),
             (PER_REVOLUTION, has_word(code, "G99")),
             (INCREMENTS, (u || w) && (x || z) && !has_word(code, "G28")),
-            (DIAMETER, dialect == Dialect::LinuxCnc && has_word(code, "G7")),
+            (DIAMETER, is_linuxcnc && (has_word(code, "G7") || has_word(code, "G8"))),
+            (PLANE, is_linuxcnc && has_word(code, "G18")),
+            (FEED_PER_REVOLUTION, is_linuxcnc && has_word(code, "G95")),
+            (THREAD, is_linuxcnc && has_word(code, "G33")),
         ];
         for (kind, _) in tests.into_iter().filter(|(_, is_found)| *is_found) {
             self.found[kind].get_or_insert((number, KINDS[kind].1));

@@ -11,13 +11,15 @@ use super::extent::{length, norm, positions};
 use super::setpoints::{PartProgramOptions, ProgramTrack};
 use crate::builtin::{open_program, program_folder};
 use crate::interpret::{
-    DetectedDialect, InterpretationReport, Interpreter, InterpreterOptions, NO_AXIS, Occurrences,
-    TipTransform, system_name,
+    DetectedDialect, InterpretationReport, Interpreter, InterpreterOptions, Occurrences, TipTransform,
+    system_name,
 };
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Feed, MotionKind, ProgramEvent, ProgramMotion, ProgramStep};
 
 /// Distance beyond a travel limit that is the rounding of a program, m or rad.
 const ROUNDING: f64 = 1e-9;
+/// Full turn, the largest useful work offset of a rotary axis, rad.
+const TURN: f64 = std::f64::consts::TAU;
 /// Largest number of errors on a page.
 const MAX_LINES: usize = 60;
 
@@ -28,6 +30,8 @@ pub struct ProgramSurvey {
     pub dialect: DetectedDialect,
     /// Words without effect, assumptions and errors.
     pub report: InterpretationReport,
+    /// Letters of the axes that the program moves and the machine lacks.
+    pub missing_axes: BTreeSet<char>,
     /// Number of rapid traverses.
     pub rapids: usize,
     /// Number of straight lines at feed.
@@ -87,6 +91,7 @@ impl ProgramSurvey {
         let mut survey = Self {
             dialect: steps.dialect().clone(),
             report: InterpretationReport::default(),
+            missing_axes: BTreeSet::new(),
             rapids: 0,
             lines: 0,
             arcs: 0,
@@ -126,6 +131,7 @@ impl ProgramSurvey {
             }
         }
         survey.report.clone_from(steps.report());
+        survey.missing_axes = steps.missing_axes();
         if let Some(error) = failure {
             let found = Occurrences { count: 1, first_line: error.line };
             survey.report.errors.insert(error.reason, found);
@@ -191,13 +197,6 @@ impl ProgramSurvey {
             ..ProgramTrack::default()
         };
         track.notes()
-    }
-
-    /// Returns the letters of the axes that the program moves and the machine lacks.
-    pub fn missing_axes(&self) -> BTreeSet<char> {
-        let errors = self.report.errors.keys();
-        let letters = errors.filter_map(|error| Some(error.split_once(NO_AXIS)?.1.split_once(';')?.0));
-        letters.flat_map(|letters| letters.chars().filter(char::is_ascii_uppercase)).collect()
     }
 
     /// Returns the errors of the program and its travel excess as one page, or `None` for a valid program. A single error
@@ -270,8 +269,11 @@ impl ProgramSurvey {
             return format!("{name}: with tool center point control, move the workpiece frame");
         }
         let offset = self.work_offsets.get(&system).map_or(0.0, |offset| offset[index]);
-        let [least, most] = [limits.travel_min - low, limits.travel_max - high]
-            .map(|shift| Position(axis, offset + shift).to_string());
+        let [least, most] = [limits.travel_min - low, limits.travel_max - high].map(|shift| offset + shift);
+        if axis.kind() == AxisKind::Rotary && (least > TURN || most < -TURN) {
+            return format!("none: {} turns more than its travel: it must be continuous", axis.name());
+        }
+        let [least, most] = [least, most].map(|position| Position(axis, position).to_string());
         let letter = AXIS_LETTERS[index];
         let fit = format!("{name} {letter}: {least} to {most} (now {})", Position(axis, offset));
         match self.set_work_offsets.contains(&system) {

@@ -106,3 +106,10 @@ fn splines_have_their_control_points() {
         }
     }
 }
+
+#[test]
+fn the_diameter_of_the_tool_is_a_parameter_in_millimeters() {
+    // 0 without a tool; after M6 that of the tool, also one that G10 L1 sets, in inches here.
+    let text = "G21 G90\nG10 L1 P2 R3\nG0 X[#5410+1]\nT2 M6\nX#5410\nG20\nG10 L1 P2 R0.25\nG21\nX#5410\nT0 M6\nX[#5410+2]\nM2\n";
+    assert_eq!(x_of(text), [1000, 6000, 12_700, 2000]);
+}

@@ -325,7 +325,9 @@ fn an_alarm_ends_the_program_and_missing_units_are_noted() {
         interpreter.report().clone()
     };
     let found = report("O1\nIF[#1EQ#0]THEN#3000=1(NO A)\nG0 X#1 Q7\nM30\n");
-    assert_eq!(found.errors.keys().collect::<Vec<_>>(), ["alarm of the program: #3000=1"]);
+    let errors: Vec<_> = found.errors.keys().collect();
+    let [error] = &errors[..] else { panic!("{errors:?}") };
+    assert!(error.starts_with("alarm of the program: #3000=1 (NO A); #1 has no value: "), "{error}");
     let note = "lengths and feeds are in mm: no G20 or G21 stands before";
     for (line, first) in [("G0 Z0\nX1. F10.", Some(3)), ("G21\nX1.", None), ("G20\nX1.", None)] {
         let found = report(&format!("O1\n{line}\nX2.\nM30\n"));
@@ -626,4 +628,65 @@ fn a_chamfer_by_macro_b_has_circles_of_growing_radius() {
         .collect();
     assert_eq!(circles.len(), 3);
     assert!(circles.iter().all(|sweep| (sweep - 2.0 * std::f64::consts::PI).abs() < 1e-9), "{circles:?}");
+}
+
+#[test]
+fn words_of_macros_are_abbreviated_to_two_letters_and_more() {
+    // WHILE, END, GOTO, THEN and functions, as a control of Fanuc completes them.
+    let text = "O1\nG21G90G0X0Y0Z0\n#1=0\nWH[#1LT3]DO1\nG0X[#1*10.+1.]\n#1=#1+1\nEN1\nG0YCO[60.]\nG0Y[SQ[16.]+RO[1.4]]\n\
+                IF[[#1EQ3]AN[1EQ1]]GO5\nG0X99.\nN5IF[#1EQ3]TH#2=7.\nG0Z#2\nG28XY\nM30\n";
+    let expected = [
+        [1.0, 0.0, 0.0],
+        [11.0, 0.0, 0.0],
+        [21.0, 0.0, 0.0],
+        [21.0, 0.5, 0.0],
+        [21.0, 5.0, 0.0],
+        [21.0, 5.0, 7.0],
+        [0.0, 0.0, 7.0],
+    ];
+    assert_ends(Dialect::Fanuc, text, &expected);
+    // Haas has the whole words only.
+    let error =
+        steps("O1\n#1=0\nWH[#1LT3]DO1\nEN1\n", options(Dialect::Haas)).expect_err("no word").to_string();
+    assert!(error.starts_with("part.nc:3: "), "{error}");
+}
+
+/// Returns the errors and assumptions of a program, all at once.
+fn report(text: &str) -> (Vec<String>, Vec<String>) {
+    let options = InterpreterOptions { reports_all_errors: true, ..options(Dialect::Fanuc) };
+    let mut interpreter = Interpreter::new(std::io::Cursor::new(text.to_owned()), "part.nc", options);
+    let errors: Vec<_> =
+        interpreter.by_ref().filter_map(|step| step.err().map(|error| error.reason)).collect();
+    let report = interpreter.report();
+    (
+        errors.into_iter().chain(report.errors.keys().cloned()).collect(),
+        report.assumptions.keys().cloned().collect(),
+    )
+}
+
+#[test]
+fn a_macro_without_its_call_names_the_arguments_that_it_lacks() {
+    let arguments = "a macro with arguments runs by the program that calls it, as with G65 P9010 X10";
+    let (errors, assumptions) = report("O9010\nG21\nG0 X#24 Z1.\nG1 Z-1. F#9\nM99\n");
+    assert!(
+        assumptions.contains(&format!("word X has no effect: #24 has no value: {arguments}")),
+        "{assumptions:?}"
+    );
+    assert_eq!(errors, [format!("feed missing: word F: #9 has no value: {arguments}")]);
+    let (errors, _) = report("O9010\nIF[#24EQ#0]GOTO9\nM30\nN9#3000=100(X IS MISSING)\nM99\n");
+    assert_eq!(
+        errors,
+        [format!("alarm of the program: #3000=100 (X IS MISSING); #24 has no value: {arguments}")]
+    );
+    // Common variables keep their values in the control.
+    let (errors, _) = report("O1\nG21\nG1 X1. F#650\nM30\n");
+    let value = "set it at the start of the program to its value in the control";
+    assert_eq!(errors, [format!("feed missing: word F: #650 has no value: {value}")]);
+    // With the call, words of arguments that are left out have no effect, without a note.
+    let (errors, assumptions) = report("O1\nG21\nG65 P9010 Z-1. F100.\nM30\nO9010\nG1 X#24 Z#26 F#9\nM99\n");
+    assert!(errors.is_empty(), "{errors:?}");
+    assert!(assumptions.iter().all(|text| !text.contains("has no value")), "{assumptions:?}");
+    // The alarm of a main program has the text of its comment.
+    let (errors, _) = report("O1\n#3000=5(TOO DEEP)\nM30\n");
+    assert_eq!(errors, ["alarm of the program: #3000=5 (TOO DEEP)"]);
 }

@@ -204,3 +204,35 @@ fn work_offsets_of_mach3_have_numbers() {
     let ends: Vec<_> = motions(text, options).iter().map(|motion| millimeters(&motion.end)).collect();
     assert_eq!(ends, [[11.0, 21.0, 0.0], [1.0, 2.0, 0.0], [3.0, 4.0, 0.0]]);
 }
+
+#[test]
+fn what_grbl_rejects_and_its_relatives_accept_is_noted() {
+    let notes = |text: &str| -> Vec<String> {
+        let options = InterpreterOptions { dialect: Some(Dialect::Grbl), ..InterpreterOptions::default() };
+        let mut interpreter = Interpreter::new(std::io::Cursor::new(text.to_owned()), "part.nc", options);
+        let errors: Vec<_> = interpreter.by_ref().filter_map(Result::err).collect();
+        assert!(errors.is_empty(), "{errors:?}");
+        interpreter.report().assumptions.keys().filter(|note| note.contains("grbl 1.1")).cloned().collect()
+    };
+    assert_eq!(
+        notes("G21\nG64\nT1 M6\nG4 S2\nM2\n"),
+        [
+            "G4 S: grbl 1.1 requires P, the dwell in s (error 28)",
+            "G64: grbl 1.1 rejects it (error 20)",
+            "M6: grbl 1.1 rejects it (error 20), a sender or grblHAL changes the tool",
+        ]
+    );
+    assert!(notes("G21\nG61\nT1\nG4 P2\nM3 S1000\nM2\n").is_empty());
+}
+
+#[test]
+fn all_positions_of_an_extruder_are_one_error() {
+    let text = "G28 X0 Y0\nM117 Printing\nG1 X1 F600 E0.019\nG1 X2 E0.03\nG1 X3 E0.04\nM2\n";
+    let options = InterpreterOptions { reports_all_errors: true, ..InterpreterOptions::default() };
+    let mut interpreter = Interpreter::new(std::io::Cursor::new(text.to_owned()), "part.nc", options);
+    interpreter.by_ref().for_each(drop);
+    let errors: Vec<_> = interpreter.report().errors.iter().collect();
+    let [(text, found)] = &errors[..] else { panic!("{errors:?}") };
+    assert!(text.starts_with("word E: the letter E is not supported, the extruder of a printer"), "{text}");
+    assert_eq!((found.count, found.first_line), (3, 3));
+}

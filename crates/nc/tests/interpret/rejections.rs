@@ -30,8 +30,18 @@ fn invalid_words_are_rejected_with_their_line() {
         ("G0 G1 X1", "part.nc:1: G0 and G1 exclude each other in one line"),
         ("M3 M4", "part.nc:1: M3 and M4 exclude each other in one line"),
         ("G0 X1 P5", "part.nc:1: word P has no effect in this line with G0: remove it, or program the code"),
+        (
+            "N2 L100\nX1\nM17",
+            "part.nc:1: word L has no effect in this line without a code: remove it, or program the code that it \
+             belongs to; the subprograms of Fadal format 1 are not supported",
+        ),
+        (
+            "F1 G1 X1 R2",
+            "part.nc:1: word R has no effect in this line with G1: remove it, or program the code that it belongs to; \
+             a rounded corner is ,R",
+        ),
         ("H5", "part.nc:1: word H has no effect in this line without a code"),
-        ("G0 X1E5", "part.nc:1: E5: the letter E is not supported, the extruder of a printer or"),
+        ("G0 X1E5", "part.nc:1: word E: the letter E is not supported, the extruder of a printer or"),
         ("G0 X1 N5", "part.nc:1: word N: the line number stands at the start of the line"),
         ("N", "part.nc:1: word N: a line number of digits is required"),
         ("G0 X1 O5", "part.nc:1: O5: an O-word stands at the start of the line"),

@@ -141,3 +141,29 @@ fn a_machine_file_may_choose_every_dialect() {
     };
     assert_eq!(names, Dialect::ALL.map(Dialect::name));
 }
+
+#[test]
+fn axes_that_the_machine_lacks_are_a_set() {
+    let folder = Folder::new("survey_axes");
+    let survey = |text: &str| {
+        let name = folder.file("part.nc", text);
+        let options = PartProgramOptions::default();
+        ProgramSurvey::new::<String>(&name, &[], &machine(), &options, |_| Ok(())).expect("a file")
+    };
+    let missing = |text: &str| survey(text).missing_axes.into_iter().collect::<String>();
+    // The machine has X, Y, Z, A and C.
+    assert_eq!(missing("G0 X1 A1\nM2\n"), "");
+    assert_eq!(missing("G0 X1 B5\nG0 U3 B6 W1\nM2\n"), "BUW");
+    assert_eq!(missing("G710 G54\nG0 X1 B=DC(90)\nM30\n"), "B");
+}
+
+#[test]
+fn windings_beyond_the_travel_have_no_work_offset_that_fits() {
+    let folder = Folder::new("survey_windings");
+    let options = PartProgramOptions::default();
+    // A of the machine turns from −30° to 120°.
+    let found = page(&folder, "G54 G91\nG0 X1\nG1 F1000 A7200\nM2\n", &options).expect("beyond the travel");
+    assert!(found.contains("none: a turns more than its travel: it must be continuous"), "{found}");
+    let found = page(&folder, "G54\nG0 X1\nG1 F1000 A200\nM2\n", &options).expect("beyond the travel");
+    assert!(found.contains("G54 A: -230° to -80° (now 0°)"), "{found}");
+}

@@ -35,6 +35,9 @@ fn turning_programs_are_rejected_by_one_sentence() {
         (1, "a tool with its offset", "N1 T0202\nN2 G0 X40. Z2.\nN3 G1 Z-5. U-2. F0.1\nN4 W-10.\nN5 M30\n"),
         // LinuxCNC.
         (1, "G96", "G7 G18 G21 G96 S200 D2000\nM3\nG0 X20 Z1\nG95 G1 Z-10 F0.1\nM2\n"),
+        // LinuxCNC, with X as radius and no surface speed.
+        (1, "G7 or G8", "G8 G18 G21 G95\nM3 S800\nG0 X10 Z1\nG1 Z-10 F0.1\nM2\n"),
+        (4, "G33", "G18 G21\nM3 S800\nG95 G0 X10 Z1\nG33 Z-10 K1\nG0 X12\nM2\n"),
         // Inches, with dots in all words.
         (4, "G71, G72", "O5\nG20\nT0101\nG71P100Q200U.02W.005F.012\nN100G0X1.\nN200Z-1.\nM30\n"),
     ] {

@@ -313,7 +313,7 @@ impl CommandInput {
         self.is_surveyed.set(true);
         match survey.page(&self.name, machine) {
             Some(mut page) => {
-                if let Some(name) = machine_with(machine, &survey.missing_axes()) {
+                if let Some(name) = machine_with(machine, &survey.missing_axes) {
                     page += &format!(
                         "\na built-in machine with these axes as a template: virtual_axes machines --new {name} > mine.yaml"
                     );

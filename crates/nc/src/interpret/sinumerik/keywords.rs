@@ -16,6 +16,7 @@ const ACCEPTED: &[&str] = &[
     "COMPCAD",
     "COMPSURF",
     "COMPOF",
+    "FENDNORM",
     "FNORM",
     "FLIN",
     "FCUB",
@@ -187,8 +188,8 @@ const ACCEPTED: &[&str] = &[
 
 /// G codes without effect on the path.
 const ACCEPTED_G: &[u32] = &[
-    290, 450, 451, 460, 461, 462, 601, 602, 603, 621, 810, 811, 812, 813, 814, 815, 816, 817, 818, 819, 820,
-    821, 822, 823, 824, 825, 826, 827, 828, 829, 930, 931,
+    62, 290, 450, 451, 460, 461, 462, 601, 602, 603, 621, 810, 811, 812, 813, 814, 815, 816, 817, 818, 819,
+    820, 821, 822, 823, 824, 825, 826, 827, 828, 829, 930, 931,
 ];
 
 /// Words that change the geometry, with what to do.

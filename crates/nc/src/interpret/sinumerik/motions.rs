@@ -276,7 +276,7 @@ fn require_axes(words: &Words, state: &State) -> Outcome<()> {
             missing.push(letter);
         }
     }
-    if missing.is_empty() { Ok(()) } else { Err(state.options.missing_axes(&missing)) }
+    if missing.is_empty() { Ok(()) } else { Err(state.reject_axes(&missing)) }
 }
 
 /// Completes the end of a line by its angle ANG and one coordinate.
