@@ -30,8 +30,7 @@ use self::simulation::{Runs, Simulator};
 use crate::interpret::InterpreterOptions;
 
 /// Sets of distances of extra points from corners that are tried, m.
-const DISTANCES: [&[f64]; 4] =
-    [&[], &[1.2e-3], &[0.4e-3, 1.2e-3, 4e-3], &[0.15e-3, 0.5e-3, 1.5e-3, 4e-3]];
+const DISTANCES: [&[f64]; 4] = [&[], &[1.2e-3], &[0.4e-3, 1.2e-3, 4e-3], &[0.15e-3, 0.5e-3, 1.5e-3, 4e-3]];
 /// Largest shift, as a multiple of the largest error of the program.
 const LARGEST_SHIFT: f64 = 3.0;
 /// Change of the figures by which a program is better.

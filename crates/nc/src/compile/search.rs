@@ -270,8 +270,9 @@ impl Search<'_> {
             for (pieces, factor) in [(&before, SLOWER), (&around, SLOWER), (&around, SLOWER.sqrt())] {
                 let mut changes = best.changes.clone();
                 for piece in pieces {
-                    let feed = changes.feeds[*piece].min(reached[*piece]);
-                    changes.feeds[*piece] = (feed * factor).max(SLOWEST);
+                    let (feed, reached) = (changes.feeds[*piece] * factor, reached[*piece]);
+                    let has_effect = feed < reached;
+                    changes.feeds[*piece] = if has_effect { feed } else { reached * factor }.max(SLOWEST);
                 }
                 next = self
                     .candidate(changes)?
