@@ -17,6 +17,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from reference_kinematics import turn
+
 CHECKOUT = Path(__file__).parents[1]
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", CHECKOUT / "target")) / "release"
 COMMAND, LIBRARY = TARGET / "virtual_axes", TARGET / "libvirtual_axes_c.a"
@@ -163,18 +165,25 @@ def completed(
     raise AssertionError(f"{session.result}\n{session.output}")
 
 
-def simulated(session: Session, name: str, period_ms: int, deviation: dict[str, float] | None = None) -> list[dict]:
+def simulated(
+    session: Session,
+    name: str,
+    period_ms: int,
+    deviation: dict[str, float] | None = None,
+    rotary_sign: int = 1,
+) -> list[dict]:
     """Returns the trace of `virtual_axes run` on the logged commands, on plants with factors of their parameters."""
     machine, axes, _ = CASES[name]
     setpoints, trace = session.folder / "setpoints.csv", session.folder / "trace.csv"
     lines = ["time," + ",".join(axes)]
     for k, row in enumerate(session.rows()):
-        values = [command * unit(axis) for axis, command in zip(axes, row[::2], strict=True)]
+        signs = [rotary_sign if axis in "abc" else 1 for axis in axes]
+        values = [sign * command * unit(axis) for axis, command, sign in zip(axes, row[::2], signs, strict=True)]
         lines.append(",".join(map(repr, [k * period_ms / 1000, *values])))
     setpoints.write_text("\n".join(lines) + "\n")
     options = ["--machine", machine, "--set", f"periods.position_ms={period_ms}", "--trace", str(trace), "-q"]
     for key, factor in (deviation or {}).items():
-        options += [part for axis in "xyz" for part in ("--set", f"{axis}.deviation.{key}={factor}")]
+        options += [part for axis in axes for part in ("--set", f"{axis}.deviation.{key}={factor}")]
     subprocess.run([COMMAND, "run", setpoints, *options], check=True, capture_output=True, timeout=120)
     with trace.open() as file:
         return list(csv.DictReader(file))
@@ -261,13 +270,15 @@ def test_invalid_module_parameters_name_what_is_allowed(tmp_path: Path, key: str
 
 # The limits of mikron.ini: 500 mm/s along the path.
 CONTROL = ["periods.position_ms=1", "control.profile=linuxcnc", "control.path_velocity_m_min=30"]
+# xyzac-trt-kins has the tool tip at the joints X, Y, Z when A and C are at 0.
+CONTROL += ["kinematics.tool_length_mm=0"]
 PERTURBED = [
     {},
     {"inertia": 1.27, "friction": 0.78, "torque_constant": 0.76},
     {"inertia": 0.76, "friction": 1.24, "torque_constant": 1.27},
     {"inertia": 1.22, "friction": 1.28, "torque_constant": 0.8},
 ]
-"""Factors of the parameters of X, Y and Z; none of them is among the plants of the compilation but the nominal one."""
+"""Factors of the parameters of all axes; none of them is among the plants of the compilation but the nominal one."""
 WAIT_ROWS = 400
 """Servo periods of a standstill that is the dwell before the cuts."""
 
@@ -294,6 +305,15 @@ def raster_lines() -> list[str]:
     return ["F2500", *(f"G1 X{x} Y{y} Z{1.2 * math.sin(x / 4) * math.cos(y / 3) - 1:.4f}" for x, y in points)]
 
 
+def five_axis_lines() -> list[str]:
+    """Returns short lines of the tool tip while both rotary axes turn."""
+    return ["F2500"] + [
+        f"G1 X{2 * k - 25} Y{20 * math.sin(k / 6):.4f} Z{1.5 * math.cos(k / 4.5) - 2.5:.4f} "
+        f"A{20 * math.sin(k / 7.5):.4f} C{3 * k}"
+        for k in range(1, 25)
+    ]
+
+
 PARTS = {
     "corners": cuts(-30, -30, "G1 F3000 X-60", *2 * ["Y-60", "X-30", "Y-30", "X-60"], "Y-60", "X-30", "Y-30"),
     "circles": cuts(
@@ -302,7 +322,14 @@ PARTS = {
     ),
     "pocket": cuts(-40, -40, *pocket_lines()),
     "raster": cuts(-60, -50, *raster_lines()),
+    "five axes": "G43.4\n" + cuts(-25, 0, *five_axis_lines()),
 }
+
+
+def for_linuxcnc(program: str) -> str:
+    """Returns a program for xyzac-trt-kins, which always controls the tool tip and has the other sense of A and C."""
+    lines = [line for line in program.splitlines() if line not in {"G43.4", "G49"}]
+    return re.sub(r"([AC])(-?)(\d)", lambda m: f"{m[1]}{'' if m[2] else '-'}{m[3]}", "\n".join(lines))
 
 
 def path_of_cuts(program: str) -> np.ndarray:
@@ -310,7 +337,7 @@ def path_of_cuts(program: str) -> np.ndarray:
     at, code, points = {"X": 0.0, "Y": 0.0, "Z": 0.0}, 0, []
     for line in program.splitlines():
         words = [(letter, float(number)) for letter, number in re.findall(r"([A-Z])(-?[\d.]+)", line)]
-        codes = [int(number) for letter, number in words if letter == "G"]
+        codes = [int(float(number)) for letter, number in words if letter == "G"]
         values = {letter: number for letter, number in words if letter in "XYZIJ"}
         code = next((code for code in codes if code < 4), code)
         end = at | {letter: number for letter, number in values.items() if letter in at}
@@ -342,13 +369,18 @@ def largest_distance(points: np.ndarray, polyline: np.ndarray) -> float:
     return max(map(distance, points))
 
 
+def tool_tip(x: float, y: float, z: float, a: float, c: float) -> np.ndarray:
+    """Returns the tool tip in the frame of the workpiece, m."""
+    return turn(2, c) @ turn(0, a) @ np.array([x, y, z])
+
+
 def largest_error(session: Session, deviation: dict[str, float], path: np.ndarray) -> float:
     """Returns the largest distance of the cuts from the programmed path, and of that path from the cuts, µm."""
     commands = np.array([row[::2] for row in session.rows()])
     starts = np.flatnonzero(np.any(np.diff(commands, axis=0), axis=1))
     begin = starts[1 + np.flatnonzero(np.diff(starts) > WAIT_ROWS)[-1]]
-    rows = simulated(session, "mikron", 1, deviation)[begin:]
-    cut = np.array([[float(row[f"{axis}.position"]) * 1000 for axis in "xyz"] for row in rows])
+    rows = simulated(session, "mikron", 1, deviation, rotary_sign=-1)[begin:]
+    cut = np.array([tool_tip(*(float(row[f"{axis}.position"]) for axis in "xyzac")) for row in rows]) * 1000
     return 1000 * max(largest_distance(cut, path), largest_distance(path, cut))
 
 
@@ -384,7 +416,7 @@ def test_a_compiled_program_halves_the_error_of_deviating_axes(tmp_path: Path, n
     for index, text in enumerate([program, compiled]):
         folder = tmp_path / f"session{index}"
         folder.mkdir()
-        sessions.append(completed(folder, "mikron", {}, [text], has_drives=False))
+        sessions.append(completed(folder, "mikron", {}, [for_linuxcnc(text)], has_drives=False))
     path = path_of_cuts(program)
     errors = [[largest_error(session, deviation, path) for deviation in PERTURBED] for session in sessions]
     times = [motion_rows(session) / 1000 for session in sessions]
