@@ -16,8 +16,11 @@ const SEARCH_PLANTS: usize = 5;
 /// Shift of a point relative to its error in the first iteration, and the least one.
 const GAIN: f64 = 0.7;
 const LEAST_GAIN: f64 = 0.12;
-/// Most iterations of shifts, and of feeds.
+/// Shift of a point relative to its error after changes of feeds.
+const FINE_GAIN: f64 = 0.4;
+/// Most iterations of shifts, of those after the feeds, and of feeds.
 const SHIFT_ITERATIONS: usize = 12;
+const FINE_ITERATIONS: usize = 6;
 const FEED_ITERATIONS: usize = 40;
 /// Weight of the mean of the largest errors of the lines beside the largest error of the program.
 const MEAN_WEIGHT: f64 = 0.3;
@@ -91,7 +94,9 @@ impl Search<'_> {
         let Some(first) = self.candidate(self.model.unchanged())? else { return Ok(None) };
         let mut best = self.shifted(first, GAIN, SHIFT_ITERATIONS)?;
         best = self.with_feeds(best)?;
-        Ok(Some(best))
+        // Other feeds have other errors.
+        best = self.shifted(best, FINE_GAIN, FINE_ITERATIONS)?;
+        Ok(Some(self.with_feeds(best)?))
     }
 
     /// Writes, verifies and simulates changes; `None` if they are not interpreted as they are meant, or beyond limits.
@@ -282,7 +287,7 @@ impl Search<'_> {
                 }
             }
             match next {
-                Some(next) => best = self.shifted(next, 0.4, 1)?,
+                Some(next) => best = self.shifted(next, FINE_GAIN, 1)?,
                 None => worst.iter().for_each(|&piece| is_blocked[piece] = true),
             }
         }
