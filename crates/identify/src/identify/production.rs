@@ -7,15 +7,18 @@
 //! 4. Checks: results that are worse than a constant lag, or implausibly far from the machine file, are invalid.
 
 use super::closed_loop::CurrentHistory;
+use super::current_logging::{CurrentLoggings, LoggedInstant};
 use super::delays::{DelayFit, DelayParameter};
 use super::experiment::CurrentLogging;
 use super::feedforward_mode::FeedforwardMode;
 use super::gravity::GravityCurrent;
 use super::identification::Identification;
-use super::loop_fit::{LoopFit, LoopProblem};
+use super::loop_fit::LoopFit;
 use super::loop_parameter::{LoopParameter, PRIOR};
+use super::loop_problem::LoopProblem;
+use super::moving_data::CurrentRipple;
 use super::options::{IdentificationInput, RefinementScope};
-use super::plant_regression::{CurrentLoggings, CurrentRipple, LoggedInstant, PlantRegression, fit_plant};
+use super::plant_regression::{PlantRegression, fit_plant};
 use super::recorded_feedforward::{fit_recorded_feedforward, recorded_feedforward};
 use super::refine::{RefinedParameter, RefinedValue, Refinement};
 use super::resample::interpolation_error;

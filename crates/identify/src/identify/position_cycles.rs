@@ -1,0 +1,103 @@
+//! Position cycles that recordings permit, compared by the residuals of the closed loop.
+
+use super::loop_parameter::LoopParameter;
+use super::loop_problem::{LoopProblem, PERMITTED, divides};
+use super::loop_search::LoopMinimum;
+use virtual_axes_core::config::{AxisConfig, Periods};
+use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, seconds};
+
+/// Residual with the gain of the machine file, relative to the least one, up to which it is kept.
+pub(super) const KEPT: f64 = 1.1;
+/// The same for the cycle at which the signals are renewed.
+const RENEWED: f64 = 1.5;
+/// Position cycles that are compared, ns; the search starts with the first one that the recordings permit.
+const CYCLES: [Nanoseconds; 5] =
+    [2 * MILLISECOND_NS, MILLISECOND_NS, 4 * MILLISECOND_NS, 6 * MILLISECOND_NS, MILLISECOND_NS / 2];
+
+impl LoopProblem<'_> {
+    /// Returns the position cycles that the recordings permit, the first one to start with; that of the machine file last.
+    pub fn cycles(&self, given: &Periods) -> Vec<Periods> {
+        let (longest, is_certain) = self.longest_cycle;
+        let certain = (longest / seconds(given.velocity)).round().max(1.0) as Nanoseconds * given.velocity;
+        let is_permitted = |cycle: &Nanoseconds| {
+            *cycle >= given.velocity
+                && *cycle % given.velocity == 0
+                && seconds(*cycle) <= longest * (1.0 + PERMITTED)
+        };
+        let mut cycles: Vec<Nanoseconds> = match is_certain {
+            true => vec![certain],
+            false => self
+                .renewal(given)
+                .into_iter()
+                .chain(CYCLES)
+                .chain([given.position])
+                .filter(is_permitted)
+                .collect(),
+        };
+        if cycles.is_empty() {
+            cycles.push(given.velocity);
+        }
+        let mut known = Vec::new();
+        cycles.retain(|cycle| {
+            !known.contains(cycle) && {
+                known.push(*cycle);
+                true
+            }
+        });
+        cycles.into_iter().map(|position| Periods { position, ..*given }).collect()
+    }
+
+    /// Returns the period at which the control renews its signals, rounded to velocity cycles, ns, if the recordings show it.
+    fn renewal(&self, given: &Periods) -> Option<Nanoseconds> {
+        let (signals, _) = self.recordings.iter().find(|(signals, _)| signals.is_renewal)?;
+        Some((signals.period / seconds(given.velocity)).round() as Nanoseconds * given.velocity)
+    }
+
+    /// Returns the position cycle with the least residual, its minimum, and the cycles with about the same residual.
+    /// Residuals below the resolution of the encoder or the error of interpolated setpoints count alike. Among cycles with
+    /// about the same residual, the renewal of the signals is preferred, then that of the machine file if it divides the
+    /// lag, then the first one.
+    ///
+    /// A motion shows β + Tsp, so the others start with β changed by the difference of the cycles.
+    pub fn best_cycle(
+        &self,
+        (axis, given): (&AxisConfig, &Periods),
+        cycles: &[Periods],
+        parameters: &[LoopParameter],
+        first: LoopMinimum,
+    ) -> (Periods, LoopMinimum, Vec<(Periods, LoopMinimum)>) {
+        let Some(start) = cycles.first() else { return (*given, first, Vec::new()) };
+        let others = cycles.iter().skip(1).filter_map(|periods| {
+            let change = seconds(start.position) - seconds(periods.position);
+            let from = parameters.iter().zip(&first.values).map(|(parameter, value)| match parameter {
+                LoopParameter::Beta | LoopParameter::Gamma => (value + change).max(0.0),
+                _ => *value,
+            });
+            let found = self.converge(axis, periods, parameters, &from.collect::<Vec<f64>>())?;
+            Some((*periods, found))
+        });
+        let mut all: Vec<(Periods, LoopMinimum)> = others.collect();
+        all.push((*start, first.clone()));
+        let count = self.experiments(start, 0.0).iter().map(|e| e.position.len()).sum::<usize>() as f64;
+        let least = all.iter().map(|(_, found)| found.cost).fold(f64::INFINITY, f64::min);
+        let interpolation = cycles.iter().map(|periods| self.interpolation(periods)).fold(0.0, f64::max);
+        let floor = self.resolution().hypot(interpolation);
+        let least = least.max(count * floor.powi(2));
+        let renewal = self.renewal(given);
+        let limit = |periods: &Periods| if Some(periods.position) == renewal { RENEWED } else { KEPT };
+        all.retain(|(periods, found)| found.cost <= limit(periods).powi(2) * least);
+        let preference = |(periods, found): &&(Periods, LoopMinimum)| {
+            let cycle = periods.position;
+            let is_dividing = divides(cycle, found.values[0]);
+            (
+                Some(cycle) == self.renewal(given),
+                is_dividing && cycle == given.position,
+                cycle == start.position,
+                is_dividing,
+                cycle,
+            )
+        };
+        let (periods, best) = all.iter().max_by_key(preference).cloned().unwrap_or((*start, first));
+        (periods, best, all)
+    }
+}
