@@ -9,7 +9,8 @@ use super::drawn::AxisOrientation;
 use super::study::{StudyFigures, ValueError};
 use super::trace_kind::TraceProgram;
 
-/// Returns the distribution of the errors, one line per sampling period, and one line per result outside of the limits:
+/// Returns the distribution of the errors, one line per sampling period, for programs of rapids and of parts, for the results
+/// that the identification calls valid and for all, and one line per result outside of the limits:
 /// Kt / Jeq 3 %, lag one cycle, β 1.5 ms, weight 3 % or within its interval, unseen program 5 µm RMS.
 pub fn study_table(figures: &[StudyFigures]) -> String {
     let mut text = String::from(
@@ -29,6 +30,8 @@ pub fn study_table(figures: &[StudyFigures]) -> String {
     };
     text += &line("rapids", &select(|program| matches!(program, TraceProgram::Rapids(_))));
     text += &line("parts", &select(|program| matches!(program, TraceProgram::Part(_))));
+    let is_valid = |figure: &&StudyFigures| figure.failure.is_none() && figure.invalid.is_empty();
+    text += &line("valid", &figures.iter().filter(is_valid).collect::<Vec<_>>());
     text += &line("all", &figures.iter().collect::<Vec<_>>());
     for figure in figures {
         if let Some(what) = figure.outside() {
