@@ -38,6 +38,33 @@ fn lines(text: &str, start: &str) -> Vec<String> {
     text.lines().filter(|line| line.starts_with(start)).map(str::to_owned).collect()
 }
 
+/// The axes, not the feed of 3 m/min, limit the speed of the contour; its rotary words have five decimals.
+#[test]
+fn a_contour_with_rotary_axes_keeps_its_lines_and_feeds_that_are_reached_are_lowered() {
+    let folder = TestFolder::new("compile_five_axes");
+    let contour = (1..9).map(|k| {
+        let angle = f64::from(k) / 4.0;
+        let [x, y, z] = [f64::from(2 * k) - 16.0, 12.0 * angle.sin(), 1.5 * angle.cos() - 2.5];
+        format!("G1 X{x} Y{y:.4} Z{z:.4} A{:.5} C{:.5}\n", 14.0 * angle.sin(), 3.3 * f64::from(k))
+    });
+    let contour: String = contour.collect();
+    let head = "G21 G90 G17 G94 G64 P0.01\nG43.4\nG0 X-16 Y0 A0 C0\nG0 Z0\nG4 P0.5\nG1 Z-1 F600\nF3000\n";
+    let part = folder.file("part.nc", &format!("{head}{contour}G1 Z0 F600\nG49\nM2\n"));
+    let (part, out) = (part.to_string_lossy().into_owned(), folder.path("better.nc"));
+    let mut arguments = vec!["compile", &part, "--same-time", "--more-time", "3", "--out", &out, "--json"];
+    for set in ["periods.position_ms=1", "control.profile=linuxcnc", "control.path_velocity_m_min=30"] {
+        arguments.extend(["--set", set]);
+    }
+    let report = json(&arguments);
+    let [before, after] = ["before", "after"].map(|when| figure(&report, when, "all_plants"));
+    assert!(after <= 0.68 * before, "{before} to {after} µm");
+    let text = std::fs::read_to_string(&out).expect("the program");
+    // G0 with A and C, and the contour: no line is divided.
+    assert_eq!(text.lines().filter(|line| line.contains('A')).count(), 9, "{text}");
+    // Every line at feed can be changed.
+    assert_eq!(report["lines_left"], serde_json::json!({}), "{report}");
+}
+
 #[test]
 fn a_compiled_program_has_the_stated_errors_and_half_of_them_on_other_plants() {
     let folder = TestFolder::new("compile_square");
