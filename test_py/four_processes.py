@@ -46,6 +46,7 @@ def source(seconds: float) -> None:
             start += periods * TSP_NS
             # At most one swing ahead, as a client that plans during the motion.
             drive.wait_until(start - periods * TSP_NS, 4 * SWING)
+        drive.wait_until(start, 4 * SWING)
 
 
 def process_model(seconds: float) -> None:
@@ -121,9 +122,9 @@ def run_graph(seconds: float) -> Figures:
             LineProcess(__file__, "process-model", seconds + 30, env=env) as model,
             LineProcess(__file__, "recorder", seconds, env=env) as keeper,
         ):
-            assert model.read_line(20) == READY
+            assert model.read_line(20) == keeper.read_line(20) == READY
             with LineProcess(__file__, "source", seconds, env=env) as swings:
-                assert swings.read_line(20) == keeper.read_line(20) == READY
+                assert swings.read_line(20) == READY
                 swings.wait()
                 keeper.go_on()
                 return Figures(**json.loads(keeper.read_line()))

@@ -79,7 +79,7 @@ def test_a_paused_node_continues_without_a_burst(real: AxesClient):
     real.wait_for(lambda: counted(diagnostics(real)[-1]), 10, "count of the missed cycles")
     messages = [array.status[0].message for array in real.diagnostics()]
     assert any("the node stalled" in message for message in messages)
-    assert "the node stalled for" in real.process.output()
+    real.wait_for(lambda: "the node stalled for" in real.process.output(), 5, "a line of the log")
     # The middleware's threads survive the pause.
     assert "poll" not in real.process.output()
     assert real.end(accepted.sequence_number, 20).status == 2

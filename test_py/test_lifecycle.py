@@ -227,7 +227,8 @@ def test_configuration_reads_the_file_again_and_can_fail(tmp_path: Path) -> None
         file.write_text(text.replace("gain", "gian"))
         assert not manager.change("configure")
         assert manager.state() == State.PRIMARY_STATE_UNCONFIGURED
-        assert "not configured" in process.output() and str(file) in process.output()
+        manager.wait_for(lambda: "not configured" in process.output(), 20, "the error in the log")
+        assert str(file) in process.output()
         file.write_text(text)
         assert manager.change("configure")
         assert manager.state() == State.PRIMARY_STATE_INACTIVE
