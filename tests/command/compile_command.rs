@@ -49,7 +49,7 @@ fn a_contour_with_rotary_axes_keeps_its_lines_and_feeds_that_are_reached_are_low
     });
     let contour: String = contour.collect();
     let head = "G21 G90 G17 G94 G64 P0.01\nG43.4\nG0 X-16 Y0 A0 C0\nG0 Z0\nG4 P0.5\nG1 Z-1 F600\nF3000\n";
-    let part = folder.file("part.nc", &format!("{head}{contour}G1 Z0 F600\nG49\nM2\n"));
+    let part = folder.file("part.nc", format!("{head}{contour}G1 Z0 F600\nG49\nM2\n"));
     let (part, out) = (part.to_string_lossy().into_owned(), folder.path("better.nc"));
     let mut arguments = vec!["compile", &part, "--same-time", "--more-time", "3", "--out", &out, "--json"];
     for set in ["periods.position_ms=1", "control.profile=linuxcnc", "control.path_velocity_m_min=30"] {
