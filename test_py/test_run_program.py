@@ -202,7 +202,7 @@ def test_the_feed_override_of_a_goal_and_a_feed_hold(programs: Follow) -> None:
         (Goal(path="/dev/zero"), Result.FILE_ERROR, f"/dev/zero: {NOT_PERMITTED}"),
         (Goal(path="/"), Result.FILE_ERROR, f"/: {NOT_PERMITTED}"),
         (Goal(program="G1 X1 F100\nG12.1\nM2\n"), Result.PROGRAM_ERROR, "program:2: G12.1"),
-        (Goal(program="G1 X1 F100\nG1 X2000\nM2\n"), Result.PROGRAM_ERROR, "program: line 2: x is at"),
+        (Goal(program="G1 X1 F10000\nG1 X2000\nM2\n"), Result.PROGRAM_ERROR, "program: line 2: x is at"),
         (
             Goal(program="G1 X1 F100\n", start_line=9),
             Result.PROGRAM_ERROR,
