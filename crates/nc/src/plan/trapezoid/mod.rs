@@ -314,7 +314,7 @@ impl TrapezoidPlanner {
         let kink_speed = self.kink_speed([first, second], &tangents, model);
         let is_blendable =
             before.is_simple && next.is_simple && are_coplanar([first, second], &tangents, model);
-        let is_straight = angle < STRAIGHT || kink_speed > before.speed.max(next.speed);
+        let is_straight = angle < STRAIGHT || kink_speed > before.speed.min(next.speed);
         match first.at_end {
             CurveEnd::Stop => {
                 self.push(&before, 0.0, SegmentEnd::Stop);
@@ -492,14 +492,15 @@ impl TrapezoidPlanner {
         let bend_speed = block.bend_speed * self.kink_share(block).sqrt();
         let most = bend_speed.min(block.scale * block.piece.length / self.control.block_cycle);
         let (mut speed, mut entry_speed) = (block.speed.min(most), block.entry_speed.min(most));
-        // The rest of a line that is short at the speed of the corner becomes part of it.
+        // The rest of a line that is short at the speed of the corner becomes part of it, whatever its own feed is.
         if let SegmentEnd::Through(corner) = end
             && cut > 0.0
             && curve(&block.piece).is_line()
             && length < self.control.gap_cycles * self.control.block_cycle * corner
         {
             acceleration *= self.control.tangential_fraction;
-            (speed, entry_speed) = (speed.min(corner), entry_speed.min(corner));
+            entry_speed = corner.min(block.entry_speed);
+            speed = entry_speed;
         }
         self.push_segment(SpeedSegment {
             piece: Arc::clone(&block.piece),
@@ -570,7 +571,7 @@ impl TrapezoidPlanner {
         let total: f64 = phases.iter().map(|phase| phase.duration).sum();
         last.duration
             .min(most / segment.acceleration)
-            .min(reached / next.acceleration)
+            .min(next.length / reached)
             .min((total - before).max(0.0))
     }
 }
