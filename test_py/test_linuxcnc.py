@@ -326,10 +326,6 @@ PARTS = {
 }
 
 
-LARGEST_RATIOS = {"five axes": 0.6}
-"""Largest error of a compiled program relative to that of the program, where it is not half."""
-
-
 def for_linuxcnc(program: str) -> str:
     """Returns a program for xyzac-trt-kins, which always controls the tool tip and has the other sense of A and C."""
     lines = [line for line in program.splitlines() if line not in {"G43.4", "G49"}]
@@ -411,7 +407,7 @@ def test_a_compiled_program_halves_the_error_of_deviating_axes(tmp_path: Path, n
     program = PARTS[name]
     part, better = tmp_path / "part.ngc", tmp_path / "better.ngc"
     part.write_text(f"G21 G90 G94 G17 G64\n{program}\nM2\n")
-    options = ["--machine", "mikron_ucp710", "--work-offset", "G54=0,0,0", "--same-time", "--more-time", "2.5"]
+    options = ["--machine", "mikron_ucp710", "--work-offset", "G54=0,0,0", "--same-time", "--more-time", "2.8"]
     sets = [part for value in CONTROL for part in ("--set", value)]
     command = [COMMAND, "compile", part, *options, *sets, "--out", better, "-q"]
     subprocess.run(command, check=True, capture_output=True, timeout=400)
@@ -426,7 +422,7 @@ def test_a_compiled_program_halves_the_error_of_deviating_axes(tmp_path: Path, n
     times = [motion_rows(session) / 1000 for session in sessions]
     cells = [f"{before:.1f} → {after:.1f}" for before, after in zip(*errors, strict=True)]
     print("|", " | ".join([name, *cells, "{:.2f} → {:.2f}".format(*times)]), "|")
-    assert max(errors[1]) <= LARGEST_RATIOS.get(name, 0.5) * max(errors[0])
+    assert max(errors[1]) <= 0.5 * max(errors[0])
     assert times[1] <= 1.03 * times[0]
 
 

@@ -23,14 +23,14 @@ use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::units::seconds;
 
 pub use self::error::CompileError;
-use self::model::ProgramModel;
+use self::model::{ExtraPoints, ProgramModel};
 pub use self::outcome::{CompileAim, CompileOptions, Compiled, CompiledFigures, CompiledLine};
-use self::search::{Candidate, Search, score};
+use self::search::{Candidate, LARGE, Search, score};
 use self::simulation::{Runs, Simulator};
 use crate::interpret::InterpreterOptions;
 
 /// Sets of distances of extra points from corners that are tried, m.
-const DISTANCES: [&[f64]; 4] = [&[], &[1.2e-3], &[0.4e-3, 1.2e-3, 4e-3], &[0.15e-3, 0.5e-3, 1.5e-3, 4e-3]];
+const DISTANCES: [&[f64]; 4] = [&[], &[1.2e-3], &[0.4e-3, 1.2e-3, 4e-3], &[0.1e-3, 0.3e-3, 1e-3, 3e-3]];
 /// Largest shift, as a multiple of the largest error of the program.
 const LARGEST_SHIFT: f64 = 3.0;
 /// Change of the figures by which a program is better.
@@ -70,11 +70,15 @@ pub fn compile(
     let (mut best, mut left_out): (Option<(ProgramModel, Candidate)>, BTreeSet<usize>) =
         (None, BTreeSet::new());
     let mut pieces = Vec::new();
+    let mut middles = BTreeMap::new();
     for distances in DISTANCES {
-        let Some(model) = verified_model((text, name), machine, &interpreter, distances, &mut left_out)?
-        else {
+        let extra = ExtraPoints { distances, middles: &middles };
+        let Some(model) = verified_model((text, name), machine, &interpreter, extra, &mut left_out)? else {
             continue;
         };
+        if distances.is_empty() {
+            middles = model.middles(&before, LARGE * before.max());
+        }
         if model.pieces.is_empty() || pieces.contains(&model.pieces.len()) {
             if best.is_none() {
                 best = Some((model, Candidate::unchanged(text, &before)));
@@ -124,12 +128,12 @@ fn verified_model(
     (text, name): (&str, &str),
     machine: &MachineConfig,
     interpreter: &InterpreterOptions,
-    distances: &[f64],
+    extra: ExtraPoints<'_>,
     left_out: &mut BTreeSet<usize>,
 ) -> Result<Option<ProgramModel>, CompileError> {
     let kinematics = Kinematics::new(machine);
     for _ in 0..VERIFICATIONS {
-        let model = ProgramModel::read((text, name), (interpreter, &kinematics), distances, left_out)?;
+        let model = ProgramModel::read((text, name), (interpreter, &kinematics), extra, left_out)?;
         let mut trial = model.unchanged();
         for (index, (shift, node)) in trial.shifts.iter_mut().zip(&model.nodes).enumerate() {
             if !node.is_fixed {

@@ -9,6 +9,7 @@ use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::units::MILLIMETER;
 
 use super::error::CompileError;
+use super::simulation::Runs;
 use super::words::{WordLine, number, rounded};
 use crate::interpret::{Interpreter, InterpreterOptions, LineModes, TipTransform};
 use crate::motion::{
@@ -24,8 +25,9 @@ const CORNER_TURN: f64 = 0.05;
 const CORNER_REACH: f64 = 3e-3;
 /// Weight of the size of the shift of a corner beside its errors.
 const CORNER_WEIGHT: f64 = 0.1;
-/// Part of a line within which extra points are placed from each of its ends.
+/// Part of a line within which extra points are placed from each of its ends, and from which one in its middle is.
 const SPLIT_PART: f64 = 0.4;
+const MIDDLE: f64 = 0.2;
 /// Difference of the tool tip from the coordinates that counts as the same on all lines, m.
 const SAME: f64 = 1e-8;
 /// Largest difference of an end of a motion from the planned one after rounding, m, and rad.
@@ -102,6 +104,15 @@ pub(super) struct ProgramModel {
     pub left: BTreeMap<&'static str, usize>,
 }
 
+/// Points that are added to the lines of a program.
+#[derive(Clone, Copy)]
+pub(super) struct ExtraPoints<'a> {
+    /// Distances from corners, m.
+    pub distances: &'a [f64],
+    /// Place of a point on a line on which rotary axes turn, as a part of its length.
+    pub middles: &'a BTreeMap<usize, f64>,
+}
+
 /// Steps of a program.
 type Steps = (Vec<(ProgramMotion, LineModes)>, Vec<ProgramEvent>);
 
@@ -119,7 +130,7 @@ fn steps(text: &str, name: &str, options: &InterpreterOptions) -> Result<Steps, 
 }
 
 impl ProgramModel {
-    /// Reads a program; lines of `left_out` are not changed, and extra points are placed at `distances` from corners, m.
+    /// Reads a program; lines of `left_out` are not changed.
     ///
     /// # Errors
     ///
@@ -127,7 +138,7 @@ impl ProgramModel {
     pub fn read(
         (text, name): (&str, &str),
         (options, kinematics): (&InterpreterOptions, &Kinematics),
-        distances: &[f64],
+        extra: ExtraPoints<'_>,
         left_out: &BTreeSet<usize>,
     ) -> Result<Self, CompileError> {
         let line_end = if text.contains("\r\n") { "\r\n" } else { "\n" };
@@ -153,7 +164,7 @@ impl ProgramModel {
                 while to < editable.len() && editable[to] && model.follows(to) {
                     to += 1;
                 }
-                model.add_chain(from..to, options.kinematics.as_ref(), kinematics, distances);
+                model.add_chain(from..to, options.kinematics.as_ref(), kinematics, extra);
             }
             from = to;
         }
@@ -211,7 +222,7 @@ impl ProgramModel {
         chain: std::ops::Range<usize>,
         transform: Option<&TipTransform>,
         kinematics: &Kinematics,
-        distances: &[f64],
+        extra: ExtraPoints<'_>,
     ) {
         let tip = |at: &Coordinates, tcp: Option<f64>| match transform {
             Some(transform) => kinematics.forward(&transform.joints(at, tcp)).tip,
@@ -241,12 +252,16 @@ impl ProgramModel {
                 _ => CutShape::Line,
             };
             let mut places = vec![1.0];
-            // A control that overlaps motions of rotary axes is slower with more of them.
-            let turns = (0..AXIS_COUNT).any(|axis| is_rotary(axis) && motion.start[axis] != motion.end[axis]);
-            let is_split = is_shifted && !turns;
-            if let (CutShape::Line, PathControl::Blend(_), true) = (shape, motion.path_control, is_split) {
+            let is_split =
+                is_shifted && matches!((shape, motion.path_control), (CutShape::Line, PathControl::Blend(_)));
+            if is_split && turns(motion) {
+                // A control that overlaps motions of rotary axes is slower with more of them.
+                places.extend(extra.middles.get(&motion.line));
+                places.sort_by(f64::total_cmp);
+            } else if is_split {
                 let length = (direction(motion, true).1).norm();
-                let near: Vec<f64> = distances
+                let near: Vec<f64> = extra
+                    .distances
                     .iter()
                     .map(|distance| distance / length)
                     .filter(|part| *part < SPLIT_PART)
@@ -338,6 +353,30 @@ impl ProgramModel {
             error += self.largest_error(piece, is_end, tips);
         }
         matrix.try_inverse().unwrap_or_default() * error
+    }
+
+    /// Returns the places of the largest errors of lines on which rotary axes turn, which can be where an axis reverses,
+    /// as parts of their lengths; none near their ends, and none of errors below `least`, m.
+    pub fn middles(&self, runs: &Runs, least: f64) -> BTreeMap<usize, f64> {
+        let mut largest: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+        let lines: BTreeMap<usize, usize> = (0..self.pieces.len())
+            .filter(|&piece| {
+                let CutPiece { motion, shape, .. } = self.pieces[piece];
+                matches!(shape, CutShape::Line) && turns(&self.motions[motion].0)
+            })
+            .map(|piece| (self.pieces[piece].line, piece))
+            .collect();
+        for (line, tip) in runs.plants.iter().flat_map(|run| &run.tips) {
+            let Some(&piece) = lines.get(line) else { continue };
+            let along = self.along(piece);
+            let from_start = tip - self.nodes[self.pieces[piece].from].tip;
+            let place = from_start.dot(&along) / along.norm_squared();
+            let error = (from_start - place * along).norm();
+            if (MIDDLE..1.0 - MIDDLE).contains(&place) && error >= largest.get(line).map_or(least, |l| l.0) {
+                largest.insert(*line, (error, place));
+            }
+        }
+        largest.into_iter().map(|(line, (_, place))| (line, place)).collect()
     }
 
     /// Returns the largest error vector normal to a line near one of its ends.
@@ -553,6 +592,11 @@ impl ProgramModel {
     pub fn line(&self, line: usize) -> &str {
         self.lines.get(line.saturating_sub(1)).map_or("", |text| text.trim())
     }
+}
+
+/// Returns true if a rotary axis turns.
+fn turns(motion: &ProgramMotion) -> bool {
+    (0..AXIS_COUNT).any(|axis| is_rotary(axis) && motion.start[axis] != motion.end[axis])
 }
 
 /// Returns the unit vector along the path at an end of a motion, and the chord of the motion, m.

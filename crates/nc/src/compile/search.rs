@@ -26,8 +26,12 @@ const FEED_ITERATIONS: usize = 40;
 const MEAN_WEIGHT: f64 = 0.3;
 /// Part of the largest error from which a line is one of the worst.
 const WORST: f64 = 0.9;
-/// Factors by which the feed of a line is lowered and raised, and the least one in all.
+/// Part of the largest error below which no feed is lowered, and no line gets a point in its middle.
+pub(super) const LARGE: f64 = 0.5;
+/// Factors by which the feed of a line is lowered and raised, and the least one in all. The overshoot after a short slow part
+/// can grow before it falls.
 const SLOWER: f64 = 0.8;
+const MUCH_SLOWER: f64 = 0.5;
 const FASTER: f64 = 1.15;
 const SLOWEST: f64 = 0.1;
 /// Pieces before and after a point whose errors decide on its shift, and the growth that is no growth.
@@ -41,6 +45,8 @@ pub(super) struct Candidate {
     pub changes: Changes,
     pub program: ChangedProgram,
     pub runs: Runs,
+    /// Largest distance of the end of each piece from the simulated path on any plant, m: a corner that is cut.
+    missed: Vec<f64>,
 }
 
 /// Search for the changes of one program.
@@ -84,7 +90,18 @@ impl Candidate {
                 sources: (1..=lines).collect(),
             },
             runs: Runs { time: runs.time, plants: Vec::new() },
+            missed: Vec::new(),
         }
+    }
+
+    /// Returns the largest error of the cuts and of the ends that they miss, m.
+    fn largest(&self) -> f64 {
+        self.missed.iter().copied().fold(self.runs.max(), f64::max)
+    }
+
+    /// Returns the largest error and part of the mean of those of the source lines, m.
+    fn score(&self) -> f64 {
+        self.largest() - self.runs.max() + score(&self.runs)
     }
 }
 
@@ -111,7 +128,14 @@ impl Search<'_> {
             Err(error) => return Err(error),
         };
         let runs = self.simulator.run(&planned, self.reference, SEARCH_PLANTS)?;
-        Ok(Some(Candidate { changes, program, runs }))
+        let mut missed = vec![0.0; self.model.pieces.len()];
+        for run in &runs.plants {
+            let tips = by_piece(&program, missed.len(), &run.tips);
+            for (piece, missed) in missed.iter_mut().enumerate() {
+                *missed = self.error_at_end(piece, &run.tips, &tips).norm().max(*missed);
+            }
+        }
+        Ok(Some(Candidate { changes, program, runs, missed }))
     }
 
     /// Returns the order of candidates: the smallest is the best.
@@ -121,9 +145,9 @@ impl Search<'_> {
             return (f64::INFINITY, f64::INFINITY);
         }
         match self.options.aim {
-            CompileAim::Tolerance(tolerance) if runs.max() <= tolerance => (0.0, runs.time),
+            CompileAim::Tolerance(tolerance) if candidate.largest() <= tolerance => (0.0, runs.time),
             CompileAim::Time(_) if runs.time > self.time => (f64::MAX, runs.time),
-            _ => (score(runs), runs.time),
+            _ => (candidate.score(), runs.time),
         }
     }
 
@@ -155,14 +179,14 @@ impl Search<'_> {
             let next = if is_reverted {
                 model.join_turns(&mut merged);
                 match self.candidate(merged)? {
-                    Some(merged) if score(&merged.runs) < score(&next.runs) => merged,
+                    Some(merged) if merged.score() < next.score() => merged,
                     _ => next,
                 }
             } else {
                 next
             };
             errors = self.piece_errors(&next);
-            let is_better = score(&next.runs) < score(&best.runs) && self.is_in_time(&next, &best);
+            let is_better = next.score() < best.score() && self.is_in_time(&next, &best);
             if is_better {
                 best = next;
                 present = None;
@@ -189,20 +213,12 @@ impl Search<'_> {
         for run in &from.runs.plants {
             let tips = by_piece(&from.program, model.pieces.len(), &run.tips);
             for (piece, parts) in model.pieces.iter().enumerate() {
-                let after =
-                    model.pieces.get(piece + 1).filter(|next| next.from == parts.to).map(|_| piece + 1);
                 let of = |piece: usize| &run.tips[tips[piece][0]..tips[piece][1]];
-                let error = match after {
+                let error = match self.following(piece) {
                     Some(after) if model.is_line_corner(piece) => {
                         model.corner_error(piece, [of(piece), of(after)])
                     }
-                    _ => {
-                        let to = after.map_or(0, |after| tips[after][1]).max(tips[piece][1]);
-                        let window =
-                            &run.tips[tips[piece][0].saturating_sub(1)..(to + 1).min(run.tips.len())];
-                        let tip = model.nodes[parts.to].tip;
-                        nearest(window, &tip).map_or(Vector3::zeros(), |nearest| nearest - tip)
-                    }
+                    _ => self.error_at_end(piece, &run.tips, &tips),
                 };
                 errors[parts.to].add(error.into());
                 if let Some((center, radius, [first, second])) = model.circle(piece) {
@@ -232,6 +248,26 @@ impl Search<'_> {
         }
         model.join_turns(&mut changes);
         changes
+    }
+
+    /// Returns the piece that begins at the end of another one.
+    fn following(&self, piece: usize) -> Option<usize> {
+        let [before, after] = [self.model.pieces.get(piece)?, self.model.pieces.get(piece + 1)?];
+        (after.from == before.to).then_some(piece + 1)
+    }
+
+    /// Returns the vector from the end of a piece to the nearest point of the tool path near it, m; `ranges` are the tool
+    /// tips of each piece.
+    fn error_at_end(
+        &self,
+        piece: usize,
+        tips: &[(usize, Vector3<f64>)],
+        ranges: &[[usize; 2]],
+    ) -> Vector3<f64> {
+        let to = self.following(piece).map_or(0, |after| ranges[after][1]).max(ranges[piece][1]);
+        let window = &tips[ranges[piece][0].saturating_sub(1)..(to + 1).min(tips.len())];
+        let tip = self.model.nodes[self.model.pieces[piece].to].tip;
+        nearest(window, &tip).map_or(Vector3::zeros(), |nearest| nearest - tip)
     }
 
     /// Returns the error at the end of a piece, on a fine path as a mean with its neighbors.
@@ -265,14 +301,22 @@ impl Search<'_> {
             let largest = (0..errors.len()).filter(open).map(|piece| errors[piece]).fold(0.0, f64::max);
             let worst: Vec<usize> =
                 (0..errors.len()).filter(open).filter(|piece| errors[*piece] >= WORST * largest).collect();
-            if worst.is_empty() {
+            if worst.is_empty() || largest < LARGE * errors.iter().copied().fold(0.0, f64::max) {
                 break;
             }
+            let own: BTreeSet<usize> = worst.iter().copied().collect();
             let before: BTreeSet<usize> = worst.iter().map(|piece| piece.saturating_sub(1)).collect();
             let around: BTreeSet<usize> = worst.iter().flat_map(|&piece| self.around(piece, 1)).collect();
             let reached = self.reached_feeds(&best);
             let mut next = None;
-            for (pieces, factor) in [(&before, SLOWER), (&around, SLOWER), (&around, SLOWER.sqrt())] {
+            for (pieces, factor) in [
+                (&before, SLOWER),
+                (&own, SLOWER),
+                (&around, SLOWER),
+                (&before, MUCH_SLOWER),
+                (&own, MUCH_SLOWER),
+                (&around, SLOWER.sqrt()),
+            ] {
                 let mut changes = best.changes.clone();
                 for piece in pieces {
                     let (feed, reached) = (changes.feeds[*piece] * factor, reached[*piece]);
@@ -295,19 +339,18 @@ impl Search<'_> {
     }
 
     /// Returns the largest feed that the nominal plant reaches on each piece, relative to the programmed one: limits of the
-    /// axes can keep it below, and a feed above it has no effect.
+    /// axes can keep it below, and a feed above it has no effect. Infinite for a piece without a cycle of its own.
     fn reached_feeds(&self, candidate: &Candidate) -> Vec<f64> {
-        let mut reached = vec![0.0; self.model.pieces.len()];
-        let Some(nominal) = candidate.runs.plants.first() else { return reached };
-        for cycle in nominal.tips.windows(2) {
+        let mut reached: Vec<Option<f64>> = vec![None; self.model.pieces.len()];
+        for cycle in candidate.runs.plants.first().iter().flat_map(|nominal| nominal.tips.windows(2)) {
             let line = cycle[1].0;
             if let Some(Some(piece)) = candidate.program.pieces.get(line.wrapping_sub(1)) {
                 let feed =
                     (cycle[1].1 - cycle[0].1).norm() / self.simulator.period() / self.model.feed(*piece);
-                reached[*piece] = feed.max(reached[*piece]);
+                reached[*piece] = Some(reached[*piece].map_or(feed, |largest| feed.max(largest)));
             }
         }
-        reached
+        reached.into_iter().map(|feed| feed.unwrap_or(f64::INFINITY)).collect()
     }
 
     /// Raises feeds up to the limit, and lowered ones again, where the errors allow it.
@@ -315,7 +358,7 @@ impl Search<'_> {
         let mut best = first;
         let bound = match self.options.aim {
             CompileAim::Tolerance(tolerance) => tolerance,
-            CompileAim::Time(_) => best.runs.max(),
+            CompileAim::Time(_) => best.largest(),
         };
         let mut factor = FASTER;
         for _ in 0..SHIFT_ITERATIONS {
@@ -333,7 +376,7 @@ impl Search<'_> {
                 break;
             }
             match self.candidate(changes)? {
-                Some(next) if next.runs.max() <= bound && next.runs.time < best.runs.time => best = next,
+                Some(next) if next.largest() <= bound && next.runs.time < best.runs.time => best = next,
                 _ => factor = 1.0 + 0.5 * (factor - 1.0),
             }
             if factor < 1.02 {
@@ -350,10 +393,10 @@ impl Search<'_> {
 
     /// Returns the largest error of each piece on any plant, m.
     fn piece_errors(&self, candidate: &Candidate) -> Vec<f64> {
-        let mut errors = vec![0.0; self.model.pieces.len()];
+        let mut errors = candidate.missed.clone();
         for (line, error) in candidate.runs.lines() {
             if let Some(Some(piece)) = candidate.program.pieces.get(line.wrapping_sub(1)) {
-                errors[*piece] = error;
+                errors[*piece] = error.max(errors[*piece]);
             }
         }
         errors
