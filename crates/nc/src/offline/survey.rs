@@ -60,6 +60,8 @@ pub struct ProgramSurvey {
     work_offsets: BTreeMap<usize, [f64; AXIS_COUNT]>,
     /// Work offsets that the program sets.
     set_work_offsets: BTreeSet<usize>,
+    /// Work coordinate systems and indices of joints whose ranges no work offset moves.
+    fixed: BTreeSet<(usize, usize)>,
     has_tool_center_point: bool,
 }
 
@@ -77,12 +79,35 @@ impl ProgramSurvey {
         options: &PartProgramOptions,
         mut on_line: impl FnMut(usize) -> Result<(), E>,
     ) -> Result<Self, E> {
-        let source = open_program(name, builtin).map_err(|error| format!("{name}: {error}"))?;
         let options = InterpreterOptions {
             reports_all_errors: true,
             subprogram_folder: program_folder(name, builtin),
             ..options.interpreter(machine).map_err(|error| format!("{name}: {error}"))?
         };
+        let mut survey = Self::interpret(name, builtin, machine, options.clone(), &mut on_line)?;
+        if survey.first_excess.is_some() {
+            let mut moved = options;
+            moved.work_offsets.iter_mut().flatten().for_each(|offset| *offset += MILLIMETER);
+            let moved = Self::interpret(name, builtin, machine, moved, &mut on_line)?;
+            for (system, ranges) in &survey.by_system {
+                let (Some(system), Some(others)) = (*system, moved.by_system.get(system)) else { continue };
+                let is_fixed = |(joint, pair): (usize, (&[f64; 2], &[f64; 2]))| {
+                    ((pair.0[0] - pair.1[0]).abs() < ROUNDING).then_some((system, joint))
+                };
+                survey.fixed.extend(ranges.iter().zip(others).enumerate().filter_map(is_fixed));
+            }
+        }
+        Ok(survey)
+    }
+
+    fn interpret<E: From<String>>(
+        name: &str,
+        builtin: &BuiltinFiles,
+        machine: &MachineConfig,
+        options: InterpreterOptions,
+        on_line: &mut impl FnMut(usize) -> Result<(), E>,
+    ) -> Result<Self, E> {
+        let source = open_program(name, builtin).map_err(|error| format!("{name}: {error}"))?;
         let given = options.work_offsets.clone();
         let transform = TipTransform::new(machine);
         let start = transform.joints(&options.start, None);
@@ -106,6 +131,7 @@ impl ProgramSurvey {
             first_excess: None,
             work_offsets: BTreeMap::new(),
             set_work_offsets: BTreeSet::new(),
+            fixed: BTreeSet::new(),
             has_tool_center_point: false,
         };
         let mut failure = None;
@@ -228,7 +254,7 @@ impl ProgramSurvey {
     fn excess_table(&self, machine: &MachineConfig) -> String {
         let mut rows = vec![["axis", "program", "travel", "work offset that fits"].map(str::to_owned)];
         for (system, ranges) in &self.by_system {
-            for (axis, range) in machine.axes().iter().zip(ranges) {
+            for (joint, (axis, range)) in machine.axes().iter().zip(ranges).enumerate() {
                 if excess_text(axis, range).is_none() {
                     continue;
                 }
@@ -239,7 +265,7 @@ impl ProgramSurvey {
                     axis.name().to_owned(),
                     format!("{from} to {to}"),
                     format!("{least} to {most}"),
-                    self.fit(*system, axis, *range),
+                    self.fit(*system, joint, axis, *range),
                 ]);
             }
         }
@@ -254,7 +280,7 @@ impl ProgramSurvey {
     }
 
     /// Returns the work offset of an axis with which a range is within the travel limits.
-    fn fit(&self, system: Option<usize>, axis: &AxisConfig, [low, high]: [f64; 2]) -> String {
+    fn fit(&self, system: Option<usize>, joint: usize, axis: &AxisConfig, [low, high]: [f64; 2]) -> String {
         let Some(system) = system else {
             return "machine coordinates (G53), or the point of G28 or G30: change the program".to_owned();
         };
@@ -274,6 +300,9 @@ impl ProgramSurvey {
             return format!("none: {} turns more than its travel: it must be continuous", axis.name());
         }
         let [least, most] = [least, most].map(|position| Position(axis, position).to_string());
+        if self.fixed.contains(&(system, joint)) && !self.set_work_offsets.contains(&system) {
+            return "none: G91 or G92 counts from where the axis starts: program a motion into the travel before".to_owned();
+        }
         let letter = AXIS_LETTERS[index];
         let fit = format!("{name} {letter}: {least} to {most} (now {})", Position(axis, offset));
         match self.set_work_offsets.contains(&system) {

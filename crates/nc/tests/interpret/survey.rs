@@ -91,6 +91,21 @@ fn travel_excess_names_the_work_offset_that_fits() {
             .contains("machine coordinates (G53), or the point of G28 or G30: change the program"),
         "{machine_coordinates}"
     );
+    // Increments count from where the axis starts, and G92 from where it stands: no offset moves these positions.
+    for text in ["G54 G91\nG1 F100 Y-300\nM2\n", "G54 G92 Y5\nG1 F100 Y-295\nM2\n"] {
+        let found = page(&folder, text, &options).expect("beyond the travel");
+        assert!(found.contains(" -300 mm  "), "{found}");
+        assert!(
+            found.contains("none: G91 or G92 counts from where the axis starts: program a motion"),
+            "{found}"
+        );
+    }
+    // Behind a line with G90 the offset moves them.
+    let found = page(&folder, "G54 G0 Y-100\nG91 G1 F100 Y-200\nM2\n", &options).expect("beyond the travel");
+    assert!(
+        found.contains(&format!("G54 Y: {} mm to {} mm (now 0 mm)", least + 300.0, most + 100.0)),
+        "{found}"
+    );
     // The offset of the program takes effect in place of a given one.
     let set =
         page(&folder, "G10 L2 P1 Y-300\nG54 G0 X10\nG1 F100 Y1\nM2\n", &options).expect("beyond the travel");
