@@ -30,6 +30,8 @@ const SINUMERIK: [&str; 12] = [
     "CYCLE952(",
     "DIAMON",
 ];
+/// Contour cycles of LinuxCNC, by the number Q of a subprogram.
+const LINUXCNC: [&str; 7] = ["G70", "G71", "G71.1", "G71.2", "G72", "G72.1", "G72.2"];
 
 /// Word of a turning program with its source line, from 1.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -51,8 +53,8 @@ struct Evidence {
 }
 
 /// Kinds of evidence: points and text. Of a mill, each may occur alone.
-const KINDS: [(u32, &str); 12] = [
-    (ENOUGH, "G71, G72 or G70 with P and Q, a contour cycle"),
+const KINDS: [(u32, &str); 14] = [
+    (ENOUGH, "G71, G72 or G70 with a contour, a turning cycle"),
     (ENOUGH, "a turning cycle of Sinumerik"),
     (3, "G76 with P and Q, a threading cycle"),
     (2, "a tool with its offset, as in T0101"),
@@ -64,6 +66,8 @@ const KINDS: [(u32, &str); 12] = [
     (1, "G18, the plane ZX"),
     (1, "G95, feed per revolution"),
     (2, "G33, a thread"),
+    (ENOUGH, "G76, a threading cycle"),
+    (ENOUGH, "the speed limit G50 S"),
 ];
 const CONTOUR_CYCLE: usize = 0;
 const NAMED_CYCLE: usize = 1;
@@ -78,6 +82,8 @@ const DIAMETER: usize = 8;
 const PLANE: usize = 9;
 const FEED_PER_REVOLUTION: usize = 10;
 const THREAD: usize = 11;
+const LINUXCNC_THREAD: usize = 12;
+const OKUMA_LIMIT: usize = 13;
 
 impl TurningWord {
     /// Searches the first MiB of a program and returns to its start. Programs with words Y, A, B or with canned cycles G81
@@ -140,8 +146,11 @@ impl Evidence {
         let tests = [
             (
                 CONTOUR_CYCLE,
-                is_contour && ["G70", "G71", "G72", "G73"].iter().any(|word| has_word(code, word)),
+                is_contour && ["G70", "G71", "G72", "G73"].iter().any(|word| has_word(code, word))
+                    || is_linuxcnc && q && LINUXCNC.iter().any(|word| has_word(code, word)),
             ),
+            (LINUXCNC_THREAD, is_linuxcnc && p && !x && !y && has_word(code, "G76")),
+            (OKUMA_LIMIT, dialect == Dialect::Okuma && s && has_word(code, "G50")),
             (THREADING, p && q && !y && has_word(code, "G76") && (x || u || !z)),
             (TOOL, is_turning_tool(code)),
             (SPEED_LIMIT, s && !x && !z && (has_word(code, "G50") || has_word(code, "G92"))),
@@ -165,7 +174,7 @@ impl Evidence {
             .filter_map(|((points, _), found)| found.map(|(line, text)| (*points, text, line)))
             .collect();
         let points: u32 = found.iter().map(|(points, ..)| points).sum();
-        let has_cycle = self.found[CONTOUR_CYCLE].or(self.found[NAMED_CYCLE]).is_some();
+        let has_cycle = found.iter().any(|(points, ..)| *points >= ENOUGH);
         let is_turning = !self.has_mill_words && self.has_x && self.has_z && points >= ENOUGH;
         if !has_cycle && !is_turning {
             return None;

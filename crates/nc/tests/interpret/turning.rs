@@ -18,7 +18,7 @@ fn turning_programs_are_rejected_by_one_sentence() {
         // Roughing and finishing of a contour.
         (
             7,
-            "G71, G72 or G70 with P and Q",
+            "G71, G72 or G70 with a contour",
             "%\nO0001 (SHAFT)\nG18 G21 G40 G99\nG50 S3000\nT0101\nG96 S200 M3\nG71 P10 Q20 U0.4 W0.1 F0.25\n\
              N10 G0 X20.\nG1 Z-15.\nN20 X42.\nG70 P10 Q20\nM30\n%\n",
         ),
@@ -38,6 +38,17 @@ fn turning_programs_are_rejected_by_one_sentence() {
         // LinuxCNC, with X as radius and no surface speed.
         (1, "G7 or G8", "G8 G18 G21 G95\nM3 S800\nG0 X10 Z1\nG1 Z-10 F0.1\nM2\n"),
         (4, "G33", "G18 G21\nM3 S800\nG95 G0 X10 Z1\nG33 Z-10 K1\nG0 X12\nM2\n"),
+        // LinuxCNC: contour cycles by the number of a subprogram, threading with a drive line.
+        (
+            2,
+            "G71, G72 or G70 with a contour",
+            "G21\nG71 Q100 X20 Z1 D0.5 I0.2\nO100 SUB\nG0 X5\nG1 Z-5\nO100 ENDSUB\nM2\n",
+        ),
+        (
+            2,
+            "G76, a threading cycle",
+            "G20\nG76 P0.05 Z-1 I-.075 J.008 K.045 Q29.5 H3 R2 E.05 L2\nG0 Y1\nM2\n",
+        ),
         // Inches, with dots in all words.
         (4, "G71, G72", "O5\nG20\nT0101\nG71P100Q200U.02W.005F.012\nN100G0X1.\nN200Z-1.\nM30\n"),
     ] {
@@ -54,7 +65,11 @@ fn turning_programs_are_rejected_by_one_sentence() {
     let mut interpreter =
         Interpreter::new(std::io::Cursor::new(text), "SHAFT.MIN", InterpreterOptions::default());
     let error = interpreter.next().expect("a step").expect_err("a turning program").to_string();
-    assert!(error.starts_with("SHAFT.MIN:4: a turning program, by a tool with its offset"), "{error}");
+    assert!(error.starts_with("SHAFT.MIN:3: a turning program, by the speed limit G50 S"), "{error}");
+    // A is the angle of a line.
+    let text = "FLAN=318\nG50 S800 M90\nG96 G0 X=FLAN+5 Z10 S300 M3\nG1 X300 F0.2\nX=FLAN A-150\nM2\n";
+    let [error] = &errors(text, Some(Dialect::Okuma))[..] else { panic!("{text}") };
+    assert!(error.starts_with("part.nc:2: a turning program, by the speed limit G50 S"), "{error}");
     for (line, word, text) in [
         // Thread and facing without a cycle.
         (2, "G96", "G18 G90 G95\nG96 S200 M4\nG0 X54 Z2\nG1 Z-40 F0.25\nG33 Z-50 K1.5 SF=0\nM30\n"),
