@@ -297,6 +297,8 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
     (291, FH | NGC, ""),
     (350, HAAS, ""),
     (401, FH, ""),
+    // PathPilot ends the scaling that no program of this dialect begins.
+    (500, LINUXCNC, ""),
     (491, FH, ""),
     (501, MACH3, ""),
     (502, FH, ""),
@@ -330,6 +332,15 @@ const REMEDIES: &[(u16, &str)] = &[
     (542, "dynamic fixture offset of a turned table: program a work offset for each position"),
     (544, "compensation of the workpiece setting error: program a work offset"),
     (600, "unidirectional positioning: program G0"),
+    (661, "a macro call in each line: program G65 in the lines"),
+    (
+        870,
+        "LinuxCNC leaves the motion of G87 undefined: program G0 and G1, or G87 in --dialect fanuc, haas, mach3 or okuma",
+    ),
+    (
+        880,
+        "LinuxCNC leaves the motion of G88 undefined: program G0 and G1, or G88 in --dialect fanuc, haas, mach3 or okuma",
+    ),
     (470, "engraving of text: let the CAM system output the motions"),
     (760, "threading on a lathe: no axis of the machine turns the workpiece"),
     (1070, "cylindrical mapping: let the CAM system output the motions of the axes"),

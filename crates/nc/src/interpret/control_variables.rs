@@ -3,6 +3,7 @@
 use virtual_axes_core::units::{DEGREE, MILLIMETER};
 
 use super::codes::{Motion, PlaneCode};
+use super::dialect::Dialect;
 use super::error::Outcome;
 use super::limits::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
 use super::okuma::WORK_OFFSETS;
@@ -134,7 +135,8 @@ impl State {
             (ALARM, _) => {
                 // The control stops.
                 self.has_ended = true;
-                return Err(format!("alarm of the program: #3000={known}"));
+                let name = if self.dialect == Dialect::Okuma { "VDOUT[992]" } else { "#3000" };
+                return Err(format!("alarm of the program: {name}={known}"));
             }
             (3006, _) => self.push_event(ProgramEvent::Stop),
             (_, Some(Quantity::WorkOffset(system, axis))) => {

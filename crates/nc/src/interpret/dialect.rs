@@ -85,7 +85,7 @@ impl Dialect {
     fn of_extension(extension: &str) -> Option<Self> {
         match extension.to_ascii_lowercase().as_str() {
             "mpf" | "spf" => Some(Self::Sinumerik),
-            "min" | "ssb" => Some(Self::Okuma),
+            "min" | "ssb" | "lib" => Some(Self::Okuma),
             "eia" => Some(Self::Fanuc),
             _ => None,
         }
@@ -634,6 +634,7 @@ mod tests {
             ("PART.MPF", "G90 G0 X1\nM30\n", "sinumerik"),
             ("/jobs/part.eia", "G90 G0 X1\nM30\n", "fanuc"),
             ("PART.MIN", "G90 G0 X1\nM30\n", "okuma"),
+            ("G116-NEW.LIB", "G0 X1\nRTS\n", "okuma"),
             ("PART.MIN", "G90 G0 X1\nSB=1500 M13\nM30\n", "okuma"),
             ("part.eia", "(HAAS VF-2)\nG90 G0 X1\nM30\n", "haas"),
             ("part.nc", "G90 G0 X1\nM30\n", "linuxcnc"),

@@ -25,6 +25,27 @@ const FUNCTIONS: [(&str, Function, &str); 12] = [
     ("sqrt", f64::sqrt, "0 or positive"),
     ("tan", |x| x.to_radians().tan(), ""),
 ];
+/// Further functions of macro B: numbers with four bits for each decimal digit, and the decimal point of an argument,
+/// which arguments here need not have.
+const MACRO_B: [(&str, Function, &str); 3] = [
+    ("adp", |x| x, ""),
+    ("bcd", |x| from_digits(x, 10, 16), "an integer from 0 to 99999999"),
+    ("bin", |x| from_digits(x, 16, 10), "decimal digits of four bits"),
+];
+
+/// Returns the value with the digits in the base `of` as digits in the base `to`; NaN if there is none.
+fn from_digits(value: f64, of: u64, to: u64) -> f64 {
+    let (mut rest, mut scale, mut result) = (value as u64, 1, 0);
+    let is_valid = value >= 0.0 && value.fract() == 0.0 && value < (of as f64).powi(8);
+    while rest > 0 && is_valid {
+        if rest % of > 9 {
+            return f64::NAN;
+        }
+        result += rest % of * scale;
+        (rest, scale) = (rest / of, scale * to);
+    }
+    if is_valid { result as f64 } else { f64::NAN }
+}
 
 /// Operation on two values.
 type Operation = fn(f64, f64) -> f64;
@@ -271,12 +292,20 @@ impl<'a> Scanner<'a> {
             let [base, exponent] = self.two_values("POW")?;
             return apply("**", f64::powf, base, exponent);
         }
-        let found = FUNCTIONS.into_iter().find(|(name, ..)| self.skip(name));
+        if self.has_macro_b() && self.starts_with("prm[") {
+            return Err(
+                "PRM: a parameter of the control, which a simulation lacks: write a number in its place"
+                    .to_owned(),
+            );
+        }
+        let macro_b: &[_] = if self.has_macro_b() { &MACRO_B } else { &[] };
+        let found = FUNCTIONS.iter().chain(macro_b).copied().find(|(name, ..)| self.skip(name));
         let (name, function, range) = found.ok_or_else(|| {
             let rest = self.rest();
             let argument = rest.trim_start_matches(|letter: char| letter.is_ascii_alphabetic());
             if argument.starts_with('[') {
-                let known = FUNCTIONS.map(|(name, ..)| name.to_uppercase()).join(" ");
+                let known =
+                    FUNCTIONS.iter().map(|(name, ..)| name.to_uppercase()).collect::<Vec<_>>().join(" ");
                 return format!("{rest}: not a function; supported: ATAN EXISTS {known}");
             }
             let hint = if rest.starts_with('O') { "; is the letter O meant as zero?" } else { "" };

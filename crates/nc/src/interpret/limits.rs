@@ -34,6 +34,8 @@ pub(super) const MAX_RATE: f64 = 1e9;
 pub(super) const MAX_IDLE_LINES: u64 = 2_000_000;
 /// Lines that jumps may repeat, unless the options have another number.
 pub(super) const REPEATED_LINES: u64 = 50_000_000;
+/// Largest number of starts of a program by GOTOS.
+pub(super) const MAX_RESTARTS: u32 = 1000;
 /// Number of work coordinate systems with codes of their own: G54 to G59.3.
 pub const WORK_OFFSET_COUNT: usize = 9;
 /// Number of additional work coordinate systems: G54.1 P1 and on.

@@ -193,7 +193,9 @@ impl State {
                 self.parameters.set_numbered(2000 + axis, self.coordinate(axis))?;
             }
         }
-        self.parameters.set_of_control(5070, 1.0)?;
+        // Without a touch, G38.2 and G38.4 would end in an error, which the simulation does not have.
+        let is_touched = !matches!(code, Motion::Probe383 | Motion::Probe385);
+        self.parameters.set_of_control(5070, f64::from(is_touched))?;
         if code == Motion::Skip {
             self.modal.motion = Some(Motion::Line);
         }

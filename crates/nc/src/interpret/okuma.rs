@@ -364,6 +364,12 @@ fn variable(text: &[u8], at: &mut usize, out: &mut Vec<u8>, depth: usize) -> Out
         out.extend_from_slice(if name == b"empty" { b"#0" } else { b"#4120" });
         return Ok(());
     }
+    // An output that raises an alarm.
+    if name == b"vdout" && text[*at..].starts_with(b"[992]") {
+        *at += 5;
+        out.extend_from_slice(b"#3000");
+        return Ok(());
+    }
     if text.get(*at) == Some(&b'[') {
         let axis = name.strip_prefix(b"vzof").filter(|axis| axis.len() == 1);
         let axis = axis.and_then(|axis| AXES.iter().position(|letter| *letter == axis[0]));
@@ -424,6 +430,8 @@ mod tests {
             ("NCYLG81Z-2R3", "g81z-2r3l0"),
             ("G81 Z-2 R3 NCYL", "g81z-2r3l0"),
             ("IF [PX NE EMPTY] NXT1", "if[#<_v_px>ne#0]goto1000047658"),
+            ("VDOUT[992]=1004", "#3000=1004"),
+            ("VDOUT[6]=1", "#<_v_vdout>=1"),
             ("VFST=#81H", "#<_v_vfst>=129"),
             ("VUACM[1]='NO DATA \"PX\"'", ""),
             ("OSTRT", "ostrt"),

@@ -520,7 +520,14 @@ impl State {
             let missing = || format!("{shown}: the variable has no value: set it before it is used");
             return name.starts_with('v').then_some(0.0).ok_or_else(missing);
         }
-        value.ok_or_else(|| format!("#<{name}> has no value: set it before it is used"))
+        let is_of_control = name.starts_with("_hal[") || name.starts_with("_ini[");
+        let remedy = match is_of_control {
+            true => {
+                "is a value of the running control, which a simulation lacks: write a number in its place"
+            }
+            false => "has no value: set it before it is used",
+        };
+        value.ok_or_else(|| format!("#<{name}> {remedy}"))
     }
 
     /// Returns the upper travel limit of an axis in the coordinates in effect and units of the program.

@@ -52,6 +52,21 @@ fn loops_and_jumps_of_macro_b_drill_a_row_of_holes() {
 }
 
 #[test]
+fn decimal_digits_of_four_bits_are_converted() {
+    // 0x0024 is 36, 0x1999 is 6553; ADP adds the decimal point that numbers here need not have.
+    let text = "O1\nG21 G90\nG0 X[BIN[36]] Y[BCD[24]]\nX[BIN[6553]/10] Y[BIN[BCD[57]]] Z[ADP[5]]\nM30\n";
+    assert_ends(Dialect::Fanuc, text, &[[24.0, 36.0, 0.0], [199.9, 57.0, 5.0]]);
+    for (word, expected) in [
+        ("BIN[26]", "BIN[26]: must be decimal digits of four bits"),
+        ("BCD[1.5]", "BCD[1.5]: must be an integer from 0 to 99999999"),
+        ("PRM[1220,1]", "PRM: a parameter of the control, which a simulation lacks: write a number"),
+    ] {
+        let error = steps(&format!("O1\nG0 X[{word}]\n"), options(Dialect::Fanuc)).unwrap_err().to_string();
+        assert!(error.contains(expected), "{word}: {error}");
+    }
+}
+
+#[test]
 fn variables_without_value_are_told_from_zero() {
     let text = "O1\nG0 X1. Y1.\nG65 P9000 A5. B0\nG65 P9000 B3.\nM30\nO9000\nIF[#1EQ#0]GOTO9\nG0 X#1 Y#2 Z#3\nM99\n\
                 N9 G0 X[#1+2.] Y#2\nM99\n";
@@ -571,6 +586,13 @@ fn probing_moves_to_its_end() {
     assert_ends(Dialect::Fanuc, "O1\nG65 P9810 X3.\nM30\nO9810\nG0 Y#24\nM99\n", &[[0.0, 3.0, 0.0]]);
     let text = "G38.2 Z-2 F50\nG0 X#5063\nG38.5 Z0\n";
     assert_ends(Dialect::LinuxCnc, text, &[[0.0, 0.0, -2.0], [-2.0, 0.0, -2.0], [-2.0, 0.0, 0.0]]);
+    // #5070 is 1 if the probe has touched; nothing is touched where that is no error.
+    let text = "F50\nG38.2 Z-2\nG0 X[1+#5070]\nG38.3 Z-3\nG0 X#5070\n";
+    assert_ends(
+        Dialect::LinuxCnc,
+        text,
+        &[[0.0, 0.0, -2.0], [2.0, 0.0, -2.0], [2.0, 0.0, -3.0], [0.0, 0.0, -3.0]],
+    );
 }
 
 #[test]
@@ -587,7 +609,12 @@ fn variables_of_the_memory_are_vacant_until_set() {
 fn codes_that_end_what_is_not_active_have_no_effect() {
     let text = "O1\nG0 G17 G40 G13.1 G50.2 G25\nG54.2 P0\nG54.4 P0\nG05.4 Q0\nG113\nX2. Y3.\nM30\n";
     assert_ends(Dialect::Fanuc, text, &[[2.0, 3.0, 0.0]]);
-    for (line, remedy) in [("G54.2 P1", "dynamic fixture offset"), ("G60 X1.", "program G0")] {
+    // The first line of posts for PathPilot.
+    let text = "G90 G54 G64 G50 G17 G40 G80 G94 G91.1 G49\nG0 X2 Y3\nM30\n";
+    assert_ends(Dialect::LinuxCnc, text, &[[2.0, 3.0, 0.0]]);
+    for (line, remedy) in
+        [("G54.2 P1", "dynamic fixture offset"), ("G60 X1.", "program G0"), ("G66.1 P9", "program G65")]
+    {
         let found = steps(&format!("O1\n{line}\nM30\n"), options(Dialect::Fanuc)).map(|_| ());
         assert!(found.as_ref().is_err_and(|error| error.to_string().contains(remedy)), "{line}: {found:?}");
     }

@@ -17,6 +17,25 @@ fn invalid_words_are_rejected_with_their_line() {
             "G16",
             "part.nc:1: G16 is not supported in the dialect linuxcnc: known in --dialect fanuc or haas or mach3",
         ),
+        // The manual of LinuxCNC calls the behavior of these cycles undefined.
+        (
+            "G87 X1 Y1 Z-1 R1",
+            "part.nc:1: G87 is not supported in the dialect linuxcnc: LinuxCNC leaves the motion of G87",
+        ),
+        (
+            "G88 X1 Y1 Z-1 R1",
+            "part.nc:1: G88 is not supported in the dialect linuxcnc: LinuxCNC leaves the motion of G88",
+        ),
+        ("G51 X2", "part.nc:1: G51 is not supported in the dialect linuxcnc: known in --dialect fanuc"),
+        (
+            "F#<_hal[plasmac.cut-feed-rate]>",
+            "part.nc:1: word F: #<_hal[plasmac.cut-feed-rate]> is a value of the running control, which a simulation lacks",
+        ),
+        (
+            "G0 X#<_ini[axis_x]max_limit>",
+            "part.nc:1: word X: #<_ini[axis_x]max_limit> is a value of the running control",
+        ),
+        ("G0 X#<_depth>", "part.nc:1: word X: #<_depth> has no value: set it before it is used"),
         ("M200", "part.nc:1: M200 is not supported in the dialect linuxcnc: skip it with --ignore M200"),
         ("M97", "part.nc:1: M97 is not supported in the dialect linuxcnc: known in --dialect haas"),
         ("G33 Z1", "part.nc:1: G33 and G33.1 require K above 0, the pitch per revolution"),

@@ -14,7 +14,8 @@ use virtual_axes_nc::plan::PlanOptions;
 use crate::builtin::PROGRAMS;
 
 /// Extensions of part programs.
-const EXTENSIONS: [&str; 10] = ["nc", "ngc", "tap", "cnc", "mpf", "spf", "min", "gcode", "iso", "eia"];
+const EXTENSIONS: [&str; 12] =
+    ["nc", "ngc", "tap", "cnc", "mpf", "spf", "min", "ssb", "lib", "gcode", "iso", "eia"];
 /// Extensions of other inputs.
 const OTHER_EXTENSIONS: [&str; 5] = ["csv", "yaml", "yml", "mcap", "json"];
 /// Bytes at the start of a file in which a part program without known extension is recognized.

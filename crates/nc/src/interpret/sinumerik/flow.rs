@@ -1,7 +1,7 @@
 //! Jumps, conditions and loops: GOTO, IF, FOR, WHILE, REPEAT, LOOP, CASE.
 
 use super::super::error::Outcome;
-use super::super::limits::MAX_BLOCKS;
+use super::super::limits::{MAX_BLOCKS, MAX_RESTARTS};
 use super::super::source::Place;
 use super::super::state::State;
 use super::Sinumerik;
@@ -237,6 +237,13 @@ impl Sinumerik {
             JumpDirection::To(direction) => direction,
             JumpDirection::Optional => Direction::Both,
             JumpDirection::Start => {
+                self.restarts += 1;
+                if self.restarts > MAX_RESTARTS {
+                    return Err(format!(
+                        "GOTOS has started the program again {MAX_RESTARTS} times, without an end: program M30 in its place \
+                         for one run"
+                    ));
+                }
                 self.blocks.clear();
                 let start = self.index(lines)?.unit(from).map(|unit| unit.start);
                 return start.map_or(Ok(()), |start| lines.jump(start));

@@ -47,6 +47,9 @@ pub(super) fn function(name: &str, arguments: Vec<Option<ProgramValue>>) -> Outc
             let [low, value, high] = numbers(name, arguments)?;
             Ok(ProgramValue::Number(value.min(high).max(low)))
         }
+        ("ISFILE", _) => {
+            Err("ISFILE: files of the control are not simulated: write TRUE or FALSE in its place".to_owned())
+        }
         ("STRLEN", [ProgramValue::Text(text)]) => Ok(ProgramValue::Number(text.len() as f64)),
         ("TOUPPER", [ProgramValue::Text(text)]) => Ok(ProgramValue::Text(text.to_ascii_uppercase())),
         ("TOLOWER", [ProgramValue::Text(text)]) => Ok(ProgramValue::Text(text.to_ascii_lowercase())),

@@ -231,6 +231,8 @@ const REJECTED: &[(&str, &str)] = &[
     ("A5", VECTORS),
     ("B5", VECTORS),
     ("C5", VECTORS),
+    ("ORIVIRT1", VECTORS),
+    ("ORIVIRT2", VECTORS),
     ("ORICURVE", VECTORS),
     ("ORIPATH", VECTORS),
     ("ORICONCW", VECTORS),

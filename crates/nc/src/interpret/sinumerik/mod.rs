@@ -69,6 +69,8 @@ pub(super) struct Sinumerik {
     calls: Vec<ActiveCall>,
     /// Open structures of the present program.
     blocks: Vec<OpenStructure>,
+    /// Number of starts by GOTOS.
+    restarts: u32,
     /// Values of the last call, for its PROC.
     arguments: Vec<Option<Argument>>,
     /// Start of the present line.
@@ -105,6 +107,7 @@ impl Default for Sinumerik {
             index: None,
             calls: Vec::new(),
             blocks: Vec::new(),
+            restarts: 0,
             arguments: Vec::new(),
             place: Place::START,
             file: None,

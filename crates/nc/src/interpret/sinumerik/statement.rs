@@ -124,7 +124,13 @@ impl Sinumerik {
             }
             let name = scanner.peek_name();
             if name.is_empty() {
-                return Err(format!("{}: a word is required, a letter with a value", scanner.rest()));
+                let rest = scanner.rest();
+                return Err(match byte {
+                    b'@' => format!(
+                        "{rest}: commands @ of Sinumerik 810 to 880 are not supported: program IF, GOTOF and R=…"
+                    ),
+                    _ => format!("{rest}: a word is required, a letter with a value"),
+                });
             }
             let mut ahead = scanner.clone();
             ahead.advance(name.len());

@@ -17,6 +17,13 @@ fn blocks_that_change_the_geometry_are_rejected_with_a_remedy() {
         ),
         ("G0 X1\nBSPLINE X2 Y3", "BSPLINE is not supported: post lines and arcs"),
         ("TRANSMIT", "TRANSMIT is not supported"),
+        ("ORIVIRT1", "ORIVIRT1 is not supported: post the direction A3= B3= C3="),
+        ("@100 K1350", "@100 K1350: commands @ of Sinumerik 810 to 880 are not supported: program IF, GOTOF"),
+        ("R1=ISFILE(\"PART.SPF\")", "ISFILE: files of the control are not simulated: write TRUE or FALSE"),
+        (
+            "F100 G1 X1\nG1 X0\nGOTOS",
+            "GOTOS has started the program again 1000 times, without an end: program M30",
+        ),
         ("G143 X1", "G143 is not supported: the side of the approach"),
         ("G291", "G291 is not supported: the ISO mode is read with --dialect fanuc"),
         ("CHANGE_TOOL(1)", "CHANGE_TOOL is not supported: neither a word of the control nor a subprogram"),
