@@ -161,7 +161,7 @@ codes! {
     }
     units: Units, "Length unit" {
         Inch = 200 in ALL, "G20"; Millimeter = 210 in ALL, "G21";
-        Inch70 = 700 in MACH3 | GRBL, "G70"; Millimeter71 = 710 in MACH3 | GRBL, "G71";
+        Inch70 = 700 in FANUC | MACH3 | GRBL, "G70"; Millimeter71 = 710 in FANUC | MACH3 | GRBL, "G71";
     }
     cutter_compensation: CutterCompensation, "Cutter radius compensation" {
         Off = 400 in ALL, "G40: none";

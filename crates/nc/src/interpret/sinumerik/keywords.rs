@@ -240,6 +240,8 @@ const REJECTED: &[(&str, &str)] = &[
     ("ORICONIO", VECTORS),
     ("ORICONTO", VECTORS),
     ("ORIROTA", VECTORS),
+    ("E_HEAD", SHOP),
+    ("F_HEAD", SHOP),
     ("PTP", "program G0 without TRAORI"),
     ("DIAMON", "program radii (DIAMOF)"),
     ("DIAM90", "program radii (DIAMOF)"),
@@ -267,6 +269,8 @@ const REJECTED: &[(&str, &str)] = &[
     ("PUNCHACC", "punching is not simulated"),
 ];
 const SPLINES: &str = "post lines and arcs in place of splines and polynomials";
+const SHOP: &str =
+    "a program of steps of ShopMill or ShopTurn: convert it to G code in the control, or post it again";
 const FRAMES: &str = "program TRANS, ROT or CYCLE800";
 const VECTORS: &str = "post the direction A3= B3= C3= at the end of each block";
 const MEASURING: &str = "remove the measurement, or skip it with /";

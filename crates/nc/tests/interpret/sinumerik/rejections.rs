@@ -17,6 +17,10 @@ fn blocks_that_change_the_geometry_are_rejected_with_a_remedy() {
         ),
         ("G0 X1\nBSPLINE X2 Y3", "BSPLINE is not supported: post lines and arcs"),
         ("TRANSMIT", "TRANSMIT is not supported"),
+        (
+            "E_HEAD(0,0,1)",
+            "E_HEAD is not supported: a program of steps of ShopMill or ShopTurn: convert it to G code",
+        ),
         ("ORIVIRT1", "ORIVIRT1 is not supported: post the direction A3= B3= C3="),
         ("@100 K1350", "@100 K1350: commands @ of Sinumerik 810 to 880 are not supported: program IF, GOTOF"),
         ("R1=ISFILE(\"PART.SPF\")", "ISFILE: files of the control are not simulated: write TRUE or FALSE"),
