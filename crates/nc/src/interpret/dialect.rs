@@ -323,6 +323,11 @@ const RULES: &[(u8, u32, Pattern)] = &[
     (FANUC, 1, Word("G43.4")),
     (FANUC, 1, Word("G43.5")),
     (FANUC, 3, Word("G53.1")),
+    // First line of posts for PathPilot.
+    (LINUXCNC, 6, Code("G64G50G17")),
+    // Units in the first line of posts of NX.
+    (FANUC, 3, Code("G90G70")),
+    (FANUC, 3, Code("G90G71")),
     (FANUC, 6, Comment("FANUC")),
     (FANUC, 6, Comment("MAZAK")),
     (FANUC, 6, Comment("BROTHER")),
@@ -594,6 +599,8 @@ mod tests {
             ("; part\nN10 G0 X=R1 Y=20\n", ("sinumerik", Some(2))),
             ("N10 G54 D1\nN20 TRAORI\n", ("sinumerik", Some(2))),
             ("G43.4 H1\nG0 A40\nG4 P0.4\n", ("linuxcnc", None)),
+            ("G90 G54 G64 G50 G17 G40 G80 G94 G91.1 G49\nM201 (SDC 0)\n", ("linuxcnc", Some(1))),
+            ("%\nN10 G40 G17 G90 G71\nN20 G91 G28 Z0.0\nN30 T01 M06\n", ("fanuc", Some(2))),
             ("$H\nG21\nG0 X1\n", ("grbl", Some(1))),
             ("$I ; build\n$10=3\nG0 X1\n", ("grbl", Some(1))),
             ("G21\nM2000;custom\nG0 X1\n", ("marlin", Some(2))),

@@ -23,7 +23,12 @@ impl Sinumerik {
         match keyword {
             "IF" => {
                 scanner.advance(keyword.len());
-                let is_true = scanner.number_value(&self.scope(state))? != 0.0;
+                let value = scanner.number_value(&self.scope(state));
+                if value.is_err() && !scanner.rest().contains("GOTO") {
+                    // Its ENDIF is no further error.
+                    self.open(StructureKind::If, lines)?;
+                }
+                let is_true = value? != 0.0;
                 if let Some(target) = self.jump_target(scanner, state)? {
                     if is_true {
                         self.jump(&target, lines)?;

@@ -104,13 +104,18 @@ fn all_words_are_reported_at_once() {
 }
 
 #[test]
-fn words_of_a_thread_that_is_rejected_are_no_errors_of_their_own() {
-    let options = InterpreterOptions { reports_all_errors: true, ..options() };
-    let text = "G0 X5 Y5 Z5\nG1 Z4 F100\nG33 Z-30 K1.5 SF=0\nG0 Z20\nM30\n";
-    let mut steps = Interpreter::new(Cursor::new(text), "part.mpf", options);
-    assert!(steps.by_ref().all(|step| step.is_ok()));
-    let errors: Vec<_> = steps.report().errors.keys().collect();
-    assert!(matches!(&errors[..], [error] if error.starts_with("G33 is not supported")), "{errors:?}");
+fn a_rejection_has_no_errors_as_consequences() {
+    for (text, expected) in [
+        ("G0 X5 Y5 Z5\nG1 Z4 F100\nG33 Z-30 K1.5 SF=0\nG0 Z20\nM30\n", "G33 is not supported"),
+        ("IF ISFILE(\"A.SPF\")\nG0 X5\nELSE\nG0 X6\nENDIF\nG0 X7\nM30\n", "ISFILE: files of the control"),
+        ("IF ISFILE(\"A.SPF\") GOTOF A\nG0 X5\nA: G0 X7\nM30\n", "ISFILE: files of the control"),
+    ] {
+        let options = InterpreterOptions { reports_all_errors: true, ..options() };
+        let mut steps = Interpreter::new(Cursor::new(text), "part.mpf", options);
+        assert!(steps.by_ref().all(|step| step.is_ok()), "{text}");
+        let errors: Vec<_> = steps.report().errors.keys().collect();
+        assert!(matches!(&errors[..], [error] if error.starts_with(expected)), "{text}: {errors:?}");
+    }
 }
 
 #[test]
