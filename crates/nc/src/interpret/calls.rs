@@ -83,6 +83,11 @@ impl State {
                     block.take_integer('P')?.ok_or("M98 requires P, the number of the subprogram")?;
                 Jump::Call { program: number, times: self.repetitions_of_call(block)? }
             }
+            Subprogram::External => match block.take_integer('P')? {
+                Some(program) => Jump::Call { program, times: self.repetitions_of_call(block)? },
+                // An auxiliary function of the machine builder.
+                None => return Ok(()),
+            },
             Subprogram::Local => {
                 let number =
                     block.take_integer('P')?.ok_or("M97 requires P, the number of the line to call")?;

@@ -265,6 +265,7 @@ codes! {
     }
     subprogram: Subprogram, "Subprogram by number" {
         Call = 98 in ALL, "M98"; Return = 99 in ALL, "M99"; Local = 97 in HAAS, "M97";
+        External = 198 in FANUC, "M198: from another memory";
     }
     kinematics: KinematicsSwitch, "Kinematics" {
         CenterPoint = 428 in LINUXCNC, "M428: tool center point control";
@@ -343,6 +344,7 @@ const REMEDIES: &[(u16, &str)] = &[
     ),
     (470, "engraving of text: let the CAM system output the motions"),
     (760, "threading on a lathe: no axis of the machine turns the workpiece"),
+    (1000, "the end of mirroring on Haas; of Brother, a tool change with motions: program T, M6 and G0"),
     (1070, "cylindrical mapping: let the CAM system output the motions of the axes"),
     (1120, "polar coordinate interpolation: program the motions of the axes"),
     (1410, "3D cutter compensation: program the offset path"),

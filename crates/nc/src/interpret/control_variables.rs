@@ -138,6 +138,11 @@ impl State {
                 let name = if self.dialect == Dialect::Okuma { "VDOUT[992]" } else { "#3000" };
                 return Err(format!("alarm of the program: {name}={known}"));
             }
+            (5201..=5209, _) if known != 0.0 => {
+                return Err(format!(
+                    "#{number}, the external work offset, is not supported: add it to the work offsets"
+                ));
+            }
             (3006, _) => self.push_event(ProgramEvent::Stop),
             (_, Some(Quantity::WorkOffset(system, axis))) => {
                 self.options.work_offsets[system][axis] = known * self.unit(axis);

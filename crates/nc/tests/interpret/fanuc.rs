@@ -615,9 +615,13 @@ fn codes_that_end_what_is_not_active_have_no_effect() {
     // The first line of posts for PathPilot.
     let text = "G90 G54 G64 G50 G17 G40 G80 G94 G91.1 G49\nG0 X2 Y3\nM30\n";
     assert_ends(Dialect::LinuxCnc, text, &[[2.0, 3.0, 0.0]]);
-    for (line, remedy) in
-        [("G54.2 P1", "dynamic fixture offset"), ("G60 X1.", "program G0"), ("G66.1 P9", "program G65")]
-    {
+    for (line, remedy) in [
+        ("G54.2 P1", "dynamic fixture offset"),
+        ("G60 X1.", "program G0"),
+        ("G66.1 P9", "program G65"),
+        ("#5203=-5.", "#5203, the external work offset, is not supported: add it to the work offsets"),
+        ("G100 T1 X5.", "of Brother, a tool change with motions: program T, M6 and G0"),
+    ] {
         let found = steps(&format!("O1\n{line}\nM30\n"), options(Dialect::Fanuc)).map(|_| ());
         assert!(found.as_ref().is_err_and(|error| error.to_string().contains(remedy)), "{line}: {found:?}");
     }

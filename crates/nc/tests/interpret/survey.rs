@@ -133,6 +133,7 @@ fn subprograms_stand_in_files_beside_the_program() {
     };
     assert_eq!(run("o<drill> call [5]\no<drill> call [7]\nG0 Y1\nM2\n", Dialect::LinuxCnc), Ok(6));
     assert_eq!(run("O1\nM98 P20 L3\nG0 X1.\nM30\n", Dialect::Fanuc), Ok(5));
+    assert_eq!(run("O1\nM198 P20 L3\nM198\n#5201=0\nG0 X1.\nM30\n", Dialect::Fanuc), Ok(5));
     assert_eq!(run("$A.MIN%\nCALL OBORE PX=5\nCALL OO30 PY=4\nM2\n", Dialect::Okuma), Ok(4));
     assert_eq!(run("M98 (row.tap) L3\nG0 Y1\nM30\n", Dialect::Mach3), Ok(5));
     assert_eq!(run("O1\nM98 (/Memory/ROW.TAP)\nG0 Y1.\nM30\n", Dialect::Haas), Ok(3));
