@@ -312,6 +312,8 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
     (1030, HAAS, "P"),
     (1070, HAAS, ""),
     (1130, HAAS, ""),
+    // M codes beside the motions, of Mazak.
+    (1170, FANUC, ""),
     (1300, OKUMA, ""),
     (1310, OKUMA, "DEFIJKLPR"),
     (1320, OKUMA, "DEFIJKLPR"),

@@ -607,7 +607,8 @@ fn variables_of_the_memory_are_vacant_until_set() {
 
 #[test]
 fn codes_that_end_what_is_not_active_have_no_effect() {
-    let text = "O1\nG0 G17 G40 G13.1 G50.2 G25\nG54.2 P0\nG54.4 P0\nG05.4 Q0\nG113\nX2. Y3.\nM30\n";
+    let text =
+        "O1\nG0 G17 G40 G13.1 G50.2 G25\nG117 M8 M3\nG54.2 P0\nG54.4 P0\nG05.4 Q0\nG113\nX2. Y3.\nM30\n";
     assert_ends(Dialect::Fanuc, text, &[[2.0, 3.0, 0.0]]);
     // Units as posts of NX write them.
     let text = "%\nN0010 G40 G17 G90 G70\n:0030 T01 M06\nN0040 G0 X1. Y-.5\nN0050 G71 X10.\nN0060 M02\n%\n";
