@@ -75,3 +75,13 @@ fn a_log_without_its_columns_is_rejected() {
         &["\"q\" is no axis"],
     );
 }
+
+#[test]
+fn the_extension_of_a_part_program_excludes_a_log() {
+    let folder = TestFolder::new("log_extension");
+    let program = folder.text_file(
+        "zref.ngc",
+        "o<auto_zref> sub\nG21 G1 X1 F100\no<auto_zref> endsub\no<auto_zref> call\nM2\n",
+    );
+    assert!(printed(&["check", &program]).starts_with("part program for "));
+}

@@ -6,6 +6,7 @@ use std::path::Path;
 use virtual_axes_core::config::MachineConfig;
 use virtual_axes_io::files::RecordedPsec;
 
+use crate::input::part_program::has_program_extension;
 use crate::output::print_error;
 
 /// Columns and sampling rate of a recording of a control.
@@ -28,9 +29,10 @@ impl LogArguments {
         given.into_iter().find(|(is_given, _)| *is_given).map(|(_, name)| name)
     }
 
-    /// Returns true if a file is read as a log: because of an option, or of its content.
+    /// Returns true if a file is read as a log: because of an option, or of its content. The extension of a part program
+    /// excludes the latter: a line such as `o<zref> sub` can pass for the header of columns.
     pub fn applies_to(&self, name: &str) -> bool {
-        !self.column.is_empty() || RecordedPsec::detects(Path::new(name))
+        !self.column.is_empty() || (!has_program_extension(name) && RecordedPsec::detects(Path::new(name)))
     }
 
     /// Opens the setpoints of the axes of a machine; `has_notes` prints the findings of reading.

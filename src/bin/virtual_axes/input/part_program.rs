@@ -121,13 +121,20 @@ fn positive(text: &str) -> Result<f64, String> {
 
 /// Returns true for a built-in part program, for a file with the extension of one, and for a file with G code as content.
 pub fn is_part_program(name: &str) -> bool {
-    let extension = Path::new(name).extension().and_then(|extension| extension.to_str());
-    let is_known = |known: &[&str]| {
-        extension.is_some_and(|extension| known.iter().any(|known| extension.eq_ignore_ascii_case(known)))
-    };
     builtin_text(PROGRAMS, name).is_some()
-        || is_known(&EXTENSIONS)
-        || (!is_known(&OTHER_EXTENSIONS) && has_part_program(Path::new(name)).unwrap_or(false))
+        || has_program_extension(name)
+        || (!has_extension(name, &OTHER_EXTENSIONS) && has_part_program(Path::new(name)).unwrap_or(false))
+}
+
+/// Returns true for the name of a file with the extension of a part program.
+pub fn has_program_extension(name: &str) -> bool {
+    has_extension(name, &EXTENSIONS)
+}
+
+/// Returns true for the name of a file with one of the extensions.
+fn has_extension(name: &str, known: &[&str]) -> bool {
+    let extension = Path::new(name).extension().and_then(|extension| extension.to_str());
+    extension.is_some_and(|extension| known.iter().any(|known| extension.eq_ignore_ascii_case(known)))
 }
 
 /// Returns true if a regular file begins with lines of G code.
