@@ -40,7 +40,7 @@ fn lines(text: &str, start: &str) -> Vec<String> {
 
 /// The axes, not the feed of 3 m/min, limit the speed of the contour; its rotary words have five decimals.
 #[test]
-fn a_contour_with_rotary_axes_keeps_its_lines_and_feeds_that_are_reached_are_lowered() {
+fn a_contour_with_rotary_axes_has_few_extra_points_and_half_the_error() {
     let folder = TestFolder::new("compile_five_axes");
     let contour = (1..9).map(|k| {
         let angle = f64::from(k) / 4.0;
@@ -57,10 +57,10 @@ fn a_contour_with_rotary_axes_keeps_its_lines_and_feeds_that_are_reached_are_low
     }
     let report = json(&arguments);
     let [before, after] = ["before", "after"].map(|when| figure(&report, when, "all_plants"));
-    assert!(after <= 0.68 * before, "{before} to {after} µm");
+    assert!(after <= 0.5 * before, "{before} to {after} µm");
     let text = std::fs::read_to_string(&out).expect("the program");
-    // G0 with A and C, and the contour: no line is divided.
-    assert_eq!(text.lines().filter(|line| line.contains('A')).count(), 9, "{text}");
+    // G0 with A and C, and the contour: one line is divided, where Y nearly stands and A reverses.
+    assert_eq!(text.lines().filter(|line| line.contains('A')).count(), 10, "{text}");
     // Every line at feed can be changed.
     assert_eq!(report["lines_left"], serde_json::json!({}), "{report}");
 }
