@@ -165,7 +165,9 @@ def changing_feeds() -> str:
     """Returns nearly straight lines, some of which are slow."""
     feeds = [6000, 600, 6000, 1500, 3000, 300]
     points = [(20 + 1.1 * k, 30 + 0.03 * (-1) ** k) for k in range(60)]
-    return "\n".join(["G0 X2 Y30", "G1 X20 F3000", *(f"G1 X{x:.4f} Y{y:.4f} F{feeds[k % 6]}" for k, (x, y) in enumerate(points))])
+    return "\n".join(
+        ["G0 X2 Y30", "G1 X20 F3000", *(f"G1 X{x:.4f} Y{y:.4f} F{feeds[k % 6]}" for k, (x, y) in enumerate(points))]
+    )
 
 
 def inclined_edges() -> str:
