@@ -319,8 +319,14 @@ impl State {
 
     /// Appends a motion at the programmed feed to the steps.
     pub(super) fn push_feed(&mut self, kind: MotionKind, end: Coordinates) -> Outcome<()> {
-        let feed = self.feed(&end, matches!(kind, MotionKind::Line))?;
-        self.push_motion(kind, end, feed)
+        match self.feed(&end, matches!(kind, MotionKind::Line)) {
+            Ok(feed) => self.push_motion(kind, end, feed),
+            Err(error) => {
+                // Later motions start at its end.
+                self.position = end;
+                Err(error)
+            }
+        }
     }
 
     pub(super) fn push_motion(&mut self, kind: MotionKind, end: Coordinates, feed: Feed) -> Outcome<()> {
@@ -333,6 +339,7 @@ impl State {
                 ));
             }
         }
+        self.cubic_end = None;
         let start = self.position;
         let is_still = start.iter().zip(end).all(|(start, end)| (end - start).abs() < STILL);
         if is_still && matches!(kind, MotionKind::Line | MotionKind::Rapid) {

@@ -28,21 +28,30 @@ impl State {
         }
         let end = self.targets(block)?;
         let length = self.modal.length;
-        let mut offset = |letters: [char; 2]| match letters.map(|letter| block.take(letter)) {
-            [Some(first), Some(second)] => Ok([first * length, second * length]),
-            _ => Err(format!("a spline requires {} and {}", letters[0], letters[1])),
-        };
+        let offset =
+            |block: &mut LineWords, letters: [char; 2]| match letters.map(|letter| block.take(letter)) {
+                [Some(first), Some(second)] => Ok([first * length, second * length]),
+                _ => Err(format!("a spline requires {} and {}", letters[0], letters[1])),
+            };
         let start = self.programmed();
         let (start, last) = ([start[0], start[1]], [end[0], end[1]]);
-        let [first_x, first_y] = offset(['I', 'J'])?;
+        // A G5 without I and J continues the one before in its direction.
+        let [first_x, first_y] = match self.cubic_end {
+            Some([x, y]) if code == Motion::CubicSpline && !block.has_any(&['I', 'J']) => [-x, -y],
+            _ => offset(block, ['I', 'J'])?,
+        };
         let mut points = vec![start, [start[0] + first_x, start[1] + first_y]];
+        let mut cubic_end = None;
         if code == Motion::CubicSpline {
-            let [second_x, second_y] = offset(['P', 'Q'])?;
+            let [second_x, second_y] = offset(block, ['P', 'Q'])?;
             points.push([last[0] + second_x, last[1] + second_y]);
+            cubic_end = Some([second_x, second_y]);
         }
         points.push(last);
         let control: Vec<_> = points.into_iter().map(|point| (point, 1.0)).collect();
-        self.nurbs_to(control.len(), control, &end)
+        self.nurbs_to(control.len(), control, &end)?;
+        self.cubic_end = cubic_end;
+        Ok(())
     }
 
     fn start_nurbs(&mut self, block: &mut LineWords) -> Outcome<()> {

@@ -61,6 +61,8 @@ pub(super) struct State {
     pub returned: Option<f64>,
     /// NURBS that later lines complete.
     pub spline: Option<OpenSpline>,
+    /// P and Q, m, of a G5 that the motion before was.
+    pub cubic_end: Option<[f64; 2]>,
     /// Steps that wait for the next motion.
     pub contour: Contour,
     /// Corner between the next motion and the one after it.
@@ -258,6 +260,7 @@ impl State {
             calls: 0,
             returned: None,
             spline: None,
+            cubic_end: None,
             contour: Contour::default(),
             corner: None,
             modal_macro: None,

@@ -3,7 +3,7 @@
 use virtual_axes_nc::interpret::InterpreterOptions;
 use virtual_axes_nc::motion::{Blend, MotionKind, PathControl, ProgramEvent};
 
-use crate::common::{events, motions};
+use crate::common::{error, events, motions};
 
 /// Returns X at the end of each motion, in whole micrometers.
 fn x_of(text: &str) -> Vec<i64> {
@@ -105,6 +105,21 @@ fn splines_have_their_control_points() {
             assert!(error < 1e-12, "{nurbs:?}");
         }
     }
+}
+
+#[test]
+fn a_cubic_spline_without_i_and_j_continues_in_the_direction_of_the_one_before() {
+    let text = "F300 G0 X1 Y0\nG5 I0 J3 P1 Q-2 X5 Y5\nG5 X9 Y5 P0 Q3\n";
+    let found = motions(text, InterpreterOptions::default());
+    let MotionKind::Nurbs(nurbs) = &found[2].kind else { panic!("{found:?}") };
+    let [x, y] = nurbs.control[1].0;
+    assert!((x - 4e-3).abs() + (y - 7e-3).abs() < 1e-15, "{nurbs:?}");
+    for between in ["", "G1 X6\n"] {
+        let found = error(&format!("F300 G0 X1 Y0\n{between}G5 X9 Y5 P0 Q3\n"));
+        assert!(found.ends_with("a spline requires I and J"), "{found}");
+    }
+    let found = error("F300 G0 X1 Y0\nG5 I0 J3 P1 Q-2 X5 Y5\nG1 X6\nG5 X9 Y5 P0 Q3\n");
+    assert!(found.ends_with("a spline requires I and J"), "{found}");
 }
 
 #[test]

@@ -105,6 +105,21 @@ fn other_formats_are_named_in_one_error() {
     }
 }
 
+#[test]
+fn motions_after_a_missing_feed_start_at_its_end() {
+    let text = "G21 G90 G17 G0 X0 Y0\nG1 X10\nG2 X20 Y10 R10\nG2 X30 Y0 I0 J-10\nM2\n";
+    let options = InterpreterOptions {
+        dialect: Some(Dialect::LinuxCnc),
+        reports_all_errors: true,
+        ..InterpreterOptions::default()
+    };
+    let mut interpreter = Interpreter::new(std::io::Cursor::new(text), "part.nc", options);
+    assert!(interpreter.by_ref().all(|step| step.is_ok()));
+    let errors = &interpreter.report().errors;
+    let [(error, found)] = &errors.iter().collect::<Vec<_>>()[..] else { panic!("{errors:?}") };
+    assert!(error.starts_with("feed missing") && found.count == 3, "{errors:?}");
+}
+
 /// Lines that repeat a canned cycle whose own line has an error would have consequences of it.
 #[test]
 fn an_error_of_a_canned_cycle_has_no_consequences_in_its_next_lines() {

@@ -22,8 +22,8 @@ use crate::builtin::PROGRAMS;
 use crate::input::CommandInput;
 use crate::input::must_not_replace;
 use crate::input::part_program::PartProgramArguments;
-use crate::output::interrupt;
 use crate::output::progress::Spinner;
+use crate::output::{interrupt, print_error};
 use compile_output::CompileOutput;
 
 /// Micrometer, m.
@@ -143,7 +143,11 @@ pub fn run(arguments: &CompileArguments) -> Result<String, Box<dyn Error>> {
         must_not_replace(out, Path::new(&arguments.machine))?;
     }
     // All errors of the program at once.
-    input.survey(&config, &mut |_| ())?;
+    for (line, note) in input.survey(&config, &mut |_| ())?.notes() {
+        print_error(&format!("note: {}:{line}: {note}", arguments.input));
+    }
+    // A file that cannot be written is an error before the calculation.
+    let out = arguments.out.as_deref().map(OutputFile::create).transpose()?;
     let program = ProgramText::read(&arguments.input)?;
     let deviations = PlantDeviation::combined(arguments.by);
     let deviations = ORDER.map(|index| deviations[index]);
@@ -173,8 +177,7 @@ pub fn run(arguments: &CompileArguments) -> Result<String, Box<dyn Error>> {
         },
     )?;
     drop(spinner);
-    if let Some(out) = &arguments.out {
-        let mut file = OutputFile::create(out)?;
+    if let Some(mut file) = out {
         file.write_all(&program.bytes(&found.text))?;
         file.finish()?;
     }

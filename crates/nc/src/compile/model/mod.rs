@@ -165,10 +165,10 @@ impl ProgramModel {
             let half = |arc: &PlanarArc| (arc.sweep.abs() - TAU / 2.0).abs() < HALF_TURN_MARGIN;
             let reason = match (&motion.kind, words) {
                 _ if count.get(&motion.line) != Some(&1) => "executed more than once, or several motions",
+                (MotionKind::Nurbs(_) | MotionKind::Rapid, _) => "spline",
                 _ if !modes.is_plain || !matches!(motion.feed, Feed::Linear(_)) => {
                     "cycle, probing, compensation, rotation, scaling or feed that is not per minute"
                 }
-                (MotionKind::Nurbs(_) | MotionKind::Rapid, _) => "spline",
                 (_, None) => "words that are no literal numbers, or other codes",
                 (MotionKind::Arc(arc), Some(words)) if words.has('R') && half(arc) => "half turn by R",
                 _ if left_out.contains(&motion.line) => "position used elsewhere in the program",
