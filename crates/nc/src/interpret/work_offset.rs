@@ -21,20 +21,32 @@ impl FromStr for WorkOffset {
 
     /// Reads `G54=X,Y,Z`, `G59.1=…`, `G54.1P7=…` or `G154P7=…`, in mm, and up to three angles in degrees.
     fn from_str(text: &str) -> Result<Self, String> {
-        let required =
-            || format!("{text}: must be a work coordinate system with X,Y,Z in mm, as in G54=120,80,-350");
-        let (name, values) = text.split_once('=').ok_or_else(required)?;
-        let index = index(&name.trim().to_ascii_uppercase().replace(' ', "")).ok_or_else(required)?;
+        let required = |wrong: &str| {
+            format!(
+                "{text}: must be a work coordinate system with X,Y,Z in mm, as in G54=120,80,-350: {wrong}"
+            )
+        };
+        let (name, values) = text.split_once('=').ok_or_else(|| required("= is missing"))?;
+        let index = index(&name.trim().to_ascii_uppercase().replace(' ', "")).ok_or_else(|| {
+            required(&format!(
+                "{name} is none of G54 to G59, G59.1 to G59.3, and G54.1Pn or G154Pn with n from 1 to {ADDITIONAL_OFFSET_COUNT}"
+            ))
+        })?;
         let mut coordinates = [0.0; AXIS_COUNT];
         let mut count = 0;
         for value in values.split(',') {
             let number = value.trim().parse::<f64>().ok().filter(|number| number.is_finite());
             let unit = if is_rotary(count) { DEGREE } else { MILLIMETER };
             let number = number.map(|number| number * unit).filter(|number| number.abs() <= MAX_LENGTH);
-            *coordinates.get_mut(count).ok_or_else(required)? = number.ok_or_else(required)?;
+            let number = number.ok_or_else(|| required(&format!("{value:?} is no length or angle")))?;
+            *coordinates.get_mut(count).ok_or_else(|| required("more values than axes"))? = number;
             count += 1;
         }
-        if count < 3 { Err(required()) } else { Ok(Self { index, coordinates }) }
+        if count < 3 {
+            Err(required(&format!("{count} of 3 values")))
+        } else {
+            Ok(Self { index, coordinates })
+        }
     }
 }
 
@@ -69,8 +81,18 @@ mod tests {
         for (text, index) in [("g59.3=0,0,0", 8), ("G54.1 P1=0,0,0", 9), ("G154P300=1,2,3", 308)] {
             assert_eq!(text.parse::<WorkOffset>().map(|offset| offset.index), Ok(index), "{text}");
         }
-        for text in ["", "G54", "G54=1,2", "G53=1,2,3", "G54=1,2,x", "G154P301=0,0,0", "G54=1,2,1e99"] {
-            assert!(text.parse::<WorkOffset>().is_err(), "{text}");
+        for (text, wrong) in [
+            ("", "= is missing"),
+            ("G54", "= is missing"),
+            ("G54=1,2", "2 of 3 values"),
+            ("G53=1,2,3", "G53 is none of G54 to G59"),
+            ("G54=1,2,x", "\"x\" is no length or angle"),
+            ("G154P301=0,0,0", "with n from 1 to 300"),
+            ("G54=1,2,1e99", "\"1e99\" is no length or angle"),
+            ("G54=1,2,3,4,5,6,7,8,9,10", "more values than axes"),
+        ] {
+            let error = text.parse::<WorkOffset>().unwrap_err();
+            assert!(error.contains(wrong), "{error}");
         }
     }
 }

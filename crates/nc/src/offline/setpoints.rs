@@ -49,7 +49,9 @@ impl OverrideSchedule {
                 return Err(format!("{percent} %: must be 0 to 200 %"));
             }
             if time < 0.0 || points.last().is_some_and(|(before, _)| time <= *before) {
-                return Err(format!("{time} s: times must be 0 or more and increase"));
+                return Err(format!(
+                    "{part}: time {time} s: must be 0 or more and above that before, as in 0:100,2.5:80"
+                ));
             }
             points.push((time, percent / 100.0));
         }
