@@ -201,14 +201,20 @@ impl CurrentHistory {
 
     /// Returns the current logged at each sample, A.
     pub fn logged(&self, experiment: &Experiment, logging: CurrentLogging) -> Vec<f64> {
+        let times = (0..experiment.position.len()).map(|i| experiment.first + i as f64 * experiment.period);
+        self.logged_at(times, logging)
+    }
+
+    /// Returns the current logged at each time of a sample, A; times are those behind the first setpoint, s.
+    pub fn logged_at(&self, times: impl Iterator<Item = f64>, logging: CurrentLogging) -> Vec<f64> {
         let count = self.sums.len() - 1;
         if count == 0 {
             return Vec::new();
         }
         let value = |k: usize| self.sums[k.min(count - 1) + 1] - self.sums[k.min(count - 1)];
         let half = 0.5 * self.tsp / self.tick;
-        let of = |i: usize| {
-            let time = (experiment.first + i as f64 * experiment.period) / self.tick;
+        let of = |time: f64| {
+            let time = time / self.tick;
             let at = (time + logging.offset / self.tick + 1e-6).max(0.0);
             let (k, part) = (at as usize, (at.fract() - 1e-6).max(0.0));
             let instant = value(k) + (value(k + 1) - value(k)) * part;
@@ -219,7 +225,7 @@ impl CurrentHistory {
             let mean = (self.sums[to] - self.sums[from]) / (to - from) as f64;
             mean + logging.ripple * (instant - mean)
         };
-        (0..experiment.position.len()).map(of).collect()
+        times.map(of).collect()
     }
 }
 

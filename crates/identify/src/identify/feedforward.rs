@@ -169,7 +169,7 @@ mod tests {
         Signals {
             name: String::new(),
             period,
-            is_renewal: false,
+            renewal: None,
             cutoff: 100.0,
             trace_filter: None,
             torque_constant: None,

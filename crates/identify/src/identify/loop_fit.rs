@@ -10,7 +10,7 @@ use super::fit::BoundedParameter;
 use super::loop_parameter::{LoopParameter, apply};
 use super::loop_problem::{LONGEST, LoopProblem, divides};
 use super::loop_search::LoopMinimum;
-use super::position_cycles::KEPT;
+use super::position_cycles::{CycleMinimum, KEPT};
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::units::seconds;
 
@@ -53,29 +53,45 @@ impl LoopFit {
 }
 
 impl LoopProblem<'_> {
-    /// Returns the RMS residual of the best start, m or rad, without further search.
-    pub fn rms_of_first(&self, axis: &AxisConfig, given: &Periods, lag: f64) -> Option<f64> {
-        let (parameters, periods) = (self.parameters(axis), *self.cycles(given).first()?);
-        let search = LoopProblem { duration: SEARCHED, ..*self };
-        let found = search.best(axis, &periods, &parameters, lag)?;
-        let count = search.residuals(axis, &periods, &parameters, &found.values)?.len().max(1);
+    /// Returns the problem of a part of long recordings, for the search.
+    fn searched(&self) -> Self {
+        LoopProblem { duration: SEARCHED, ..*self }
+    }
+
+    /// Searches the least minimum with the first position cycle; `lag` is the best constant lag between commanded and
+    /// actual position, s.
+    pub fn search(&self, axis: &AxisConfig, given: &Periods, lag: f64) -> Option<LoopMinimum> {
+        self.searched().best(axis, self.cycles(given).first()?, &self.parameters(axis), lag)
+    }
+
+    /// Follows the minimum `from` of a search, whose delays can be those of a local one.
+    pub fn polished(&self, axis: &AxisConfig, given: &Periods, from: LoopMinimum) -> Option<LoopMinimum> {
+        Some(self.searched().polish(axis, self.cycles(given).first()?, &self.parameters(axis), from))
+    }
+
+    /// Returns the RMS residual of a minimum of the search, m or rad.
+    pub fn searched_rms(&self, axis: &AxisConfig, given: &Periods, found: &LoopMinimum) -> Option<f64> {
+        let (search, parameters) = (self.searched(), self.parameters(axis));
+        let count =
+            search.residuals(axis, self.cycles(given).first()?, &parameters, &found.values)?.len().max(1);
         Some((found.cost / count as f64).sqrt())
     }
 
-    /// Fits delays, gains and weights; `lag` is the best constant lag between commanded and actual position, s.
-    pub fn fit(&self, axis: &AxisConfig, given: &Periods, lag: f64) -> Option<LoopFit> {
+    /// Fits delays, gains and weights from the minimum `first` of a search.
+    pub fn fit(&self, axis: &AxisConfig, given: &Periods, first: LoopMinimum) -> Option<LoopFit> {
         let parameters = self.parameters(axis);
         let cycles = self.cycles(given);
-        let start = cycles.first()?;
         // Long recordings are searched in part only.
-        let search = LoopProblem { duration: SEARCHED, ..*self };
-        let first = search.best(axis, start, &parameters, lag)?;
-        let (periods, free, others) = search.best_cycle((axis, given), &cycles, &parameters, first);
-        let others = others.iter().filter(|(other, _)| other.position != periods.position);
-        let alternatives =
-            others.map(|(other, found)| (apply(axis, other, &parameters, &found.values).0, *other));
+        let search = self.searched();
+        let (best, all) = search.best_cycle((axis, given), &cycles, &parameters, first)?;
+        let others = all.iter().filter(|other| other.periods.position != best.periods.position);
+        let alternatives = others.map(|other| {
+            (apply(&other.axis, &other.periods, &parameters, &other.minimum.values).0, other.periods)
+        });
         let alternatives = alternatives.collect();
-        let free = search.polish(axis, &periods, &parameters, free);
+        let CycleMinimum { axis, periods, minimum } = best;
+        let axis = &axis;
+        let free = search.polish(axis, &periods, &parameters, minimum);
         // A residual below that of usual encoders outweighs the prior.
         let noise = self.correlated_noise(axis, &periods, &parameters, &free.values)?;
         let problem = LoopProblem { noise: noise.min(self.noise), ..*self };

@@ -44,6 +44,8 @@ pub(super) struct LoopProblem<'a> {
     pub fits_gain: bool,
     /// Position-loop gain of the machine file, s⁻¹.
     pub given_gain: f64,
+    /// True if the recordings show inertia, friction and gravity.
+    pub has_plant: bool,
 }
 
 impl LoopProblem<'_> {

@@ -43,7 +43,14 @@ impl LoopProblem<'_> {
         lag: f64,
     ) -> Vec<LoopMinimum> {
         let mut all = Vec::new();
-        let pairs = || DELAY_STARTS.iter().flat_map(|beta| DELAY_STARTS.map(|gamma| (*beta, gamma)));
+        // A delay without effect has one start.
+        let of =
+            |parameter| &DELAY_STARTS[..if parameters.contains(&parameter) { DELAY_STARTS.len() } else { 1 }];
+        let pairs = || {
+            of(LoopParameter::Beta)
+                .iter()
+                .flat_map(|beta| of(LoopParameter::Gamma).iter().map(|gamma| (*beta, *gamma)))
+        };
         for bandwidth in BANDWIDTH_STARTS {
             for (beta, gamma) in pairs() {
                 let value = |parameter: &LoopParameter| match parameter {

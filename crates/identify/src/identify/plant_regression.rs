@@ -48,6 +48,24 @@ pub(super) struct PlantRegression {
     pub collinear: Vec<(&'static str, &'static str, f64)>,
 }
 
+impl PlantRegression {
+    /// Returns true if the 95 % interval of the inertia is narrower than its value.
+    pub fn is_inertia_known(&self) -> bool {
+        self.inertia.value > INTERVAL * self.inertia.error
+    }
+
+    /// Sets inertia, friction and weight of an axis.
+    pub fn apply(&self, axis: &mut AxisConfig) {
+        if self.is_inertia_known() {
+            axis.motor.inertia = self.inertia.value;
+        }
+        axis.friction = self.friction.law.config;
+        if let (Some((weight, _)), AxisKind::Linear) = (self.gravity.weight, axis.kind()) {
+            axis.gravity.weight = if self.gravity.model == GravityCurrent::default() { 0.0 } else { weight };
+        }
+    }
+}
+
 /// Names of the parameters in messages.
 const NAMES: [&str; 6] = ["inertia", "gravity", "friction.a", "friction.c", "friction.b", "friction.d"];
 

@@ -1,7 +1,8 @@
 //! Position cycles that recordings permit, compared by the residuals of the closed loop.
 
-use super::loop_parameter::LoopParameter;
+use super::loop_parameter::{LoopParameter, apply};
 use super::loop_problem::{LoopProblem, PERMITTED, divides};
+use super::loop_ripple::with_plant_of_loop;
 use super::loop_search::LoopMinimum;
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, seconds};
@@ -10,6 +11,8 @@ use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, seconds};
 pub(super) const KEPT: f64 = 1.1;
 /// The same for the cycle at which the signals are renewed.
 const RENEWED: f64 = 1.5;
+/// The same up to which a cycle is compared with the plant of its ripple.
+const COMPARED: f64 = 2.0;
 /// Position cycles that are compared, ns; the search starts with the first one that the recordings permit.
 const CYCLES: [Nanoseconds; 5] =
     [2 * MILLISECOND_NS, MILLISECOND_NS, 4 * MILLISECOND_NS, 6 * MILLISECOND_NS, MILLISECOND_NS / 2];
@@ -49,24 +52,25 @@ impl LoopProblem<'_> {
 
     /// Returns the period at which the control renews its signals, rounded to velocity cycles, ns, if the recordings show it.
     fn renewal(&self, given: &Periods) -> Option<Nanoseconds> {
-        let (signals, _) = self.recordings.iter().find(|(signals, _)| signals.is_renewal)?;
-        Some((signals.period / seconds(given.velocity)).round() as Nanoseconds * given.velocity)
+        let renewal = self.recordings.iter().find_map(|(signals, _)| signals.renewal)?;
+        Some((renewal / seconds(given.velocity)).round() as Nanoseconds * given.velocity)
     }
 
-    /// Returns the position cycle with the least residual, its minimum, and the cycles with about the same residual.
-    /// Residuals below the resolution of the encoder or the error of interpolated setpoints count alike. Among cycles with
-    /// about the same residual, the renewal of the signals is preferred, then that of the machine file if it divides the
-    /// lag, then the first one.
+    /// Returns the position cycle with the least residual, and the cycles with about the same residual. Residuals below the
+    /// resolution of the encoder or the error of interpolated setpoints count alike. Among cycles with about the same
+    /// residual, the renewal of the signals is preferred, then that of the machine file if it divides the lag, then the
+    /// first one.
     ///
-    /// A motion shows β + Tsp, so the others start with β changed by the difference of the cycles.
+    /// A motion shows β + Tsp, so the others start with β changed by the difference of the cycles. Those that can be the least
+    /// are compared with the plant that the current shows with the ripple of each.
     pub fn best_cycle(
         &self,
         (axis, given): (&AxisConfig, &Periods),
         cycles: &[Periods],
         parameters: &[LoopParameter],
         first: LoopMinimum,
-    ) -> (Periods, LoopMinimum, Vec<(Periods, LoopMinimum)>) {
-        let Some(start) = cycles.first() else { return (*given, first, Vec::new()) };
+    ) -> Option<(CycleMinimum, Vec<CycleMinimum>)> {
+        let start = cycles.first()?;
         let others = cycles.iter().skip(1).filter_map(|periods| {
             let change = seconds(start.position) - seconds(periods.position);
             let from = parameters.iter().zip(&first.values).map(|(parameter, value)| match parameter {
@@ -76,19 +80,29 @@ impl LoopProblem<'_> {
             let found = self.converge(axis, periods, parameters, &from.collect::<Vec<f64>>())?;
             Some((*periods, found))
         });
-        let mut all: Vec<(Periods, LoopMinimum)> = others.collect();
-        all.push((*start, first.clone()));
+        let mut all: Vec<CycleMinimum> = others
+            .chain([(*start, first.clone())])
+            .map(|(periods, minimum)| CycleMinimum { axis: axis.clone(), periods, minimum })
+            .collect();
+        let least =
+            |all: &[CycleMinimum]| all.iter().map(|cycle| cycle.minimum.cost).fold(f64::INFINITY, f64::min);
+        let best = least(&all);
+        all.retain(|cycle| cycle.minimum.cost <= COMPARED * COMPARED * best);
+        if self.has_plant {
+            for cycle in &mut all {
+                self.refit_with_plant(cycle, parameters);
+            }
+        }
         let count = self.experiments(start, 0.0).iter().map(|e| e.position.len()).sum::<usize>() as f64;
-        let least = all.iter().map(|(_, found)| found.cost).fold(f64::INFINITY, f64::min);
         let interpolation = cycles.iter().map(|periods| self.interpolation(periods)).fold(0.0, f64::max);
         let floor = self.resolution().hypot(interpolation);
-        let least = least.max(count * floor.powi(2));
+        let least = least(&all).max(count * floor.powi(2));
         let renewal = self.renewal(given);
         let limit = |periods: &Periods| if Some(periods.position) == renewal { RENEWED } else { KEPT };
-        all.retain(|(periods, found)| found.cost <= limit(periods).powi(2) * least);
-        let preference = |(periods, found): &&(Periods, LoopMinimum)| {
-            let cycle = periods.position;
-            let is_dividing = divides(cycle, found.values[0]);
+        all.retain(|cycle| cycle.minimum.cost <= limit(&cycle.periods).powi(2) * least);
+        let preference = |found: &&CycleMinimum| {
+            let cycle = found.periods.position;
+            let is_dividing = divides(cycle, found.minimum.values[0]);
             (
                 Some(cycle) == self.renewal(given),
                 is_dividing && cycle == given.position,
@@ -97,7 +111,26 @@ impl LoopProblem<'_> {
                 cycle,
             )
         };
-        let (periods, best) = all.iter().max_by_key(preference).cloned().unwrap_or((*start, first));
-        (periods, best, all)
+        let best = all.iter().max_by_key(preference).cloned()?;
+        Some((best, all))
     }
+
+    /// Fits the loop of a cycle again with the plant that the current shows with its ripple.
+    fn refit_with_plant(&self, cycle: &mut CycleMinimum, parameters: &[LoopParameter]) {
+        let (moved, _) = apply(&cycle.axis, &cycle.periods, parameters, &cycle.minimum.values);
+        let found = with_plant_of_loop(self.recordings, &cycle.axis, (&moved, &cycle.periods));
+        let Some(axis) = found else { return };
+        if let Some(minimum) = self.converge(&axis, &cycle.periods, parameters, &cycle.minimum.values) {
+            (cycle.axis, cycle.minimum) = (axis, minimum);
+        }
+    }
+}
+
+/// Minimum of a position cycle.
+#[derive(Debug, Clone)]
+pub(super) struct CycleMinimum {
+    /// Axis with the plant of the cycle.
+    pub axis: AxisConfig,
+    pub periods: Periods,
+    pub minimum: LoopMinimum,
 }

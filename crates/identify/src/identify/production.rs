@@ -6,28 +6,24 @@
 //! 3. Inertia, friction and gravity again, with the ripple that the closed loop causes in the current.
 //! 4. Checks: results that are worse than a constant lag, or implausibly far from the machine file, are invalid.
 
-use super::closed_loop::CurrentHistory;
-use super::current_logging::{CurrentLoggings, LoggedInstant};
 use super::delays::{DelayFit, DelayParameter};
 use super::experiment::CurrentLogging;
 use super::feedforward_mode::FeedforwardMode;
-use super::gravity::GravityCurrent;
+use super::feedforward_search::{FeedforwardSearch, mean_lag};
 use super::identification::Identification;
 use super::loop_fit::LoopFit;
 use super::loop_parameter::{LoopParameter, PRIOR};
 use super::loop_problem::LoopProblem;
-use super::moving_data::CurrentRipple;
+use super::loop_ripple::possible_loggings;
+use super::loop_search::LoopMinimum;
 use super::options::{IdentificationInput, RefinementScope};
 use super::plant_regression::{PlantRegression, fit_plant};
-use super::recorded_feedforward::{fit_recorded_feedforward, recorded_feedforward};
+use super::recorded_feedforward::fit_recorded_feedforward;
 use super::refine::{RefinedParameter, RefinedValue, Refinement};
 use super::resample::interpolation_error;
 use super::setpoints::{HELD, SetpointGrid, longest_cycle, stride};
-use super::trace_experiments::trace_experiments;
-use super::validate::constant_lag;
 use crate::recording::{Finding, SignalSpan, Signals};
 use virtual_axes_core::config::{AxisConfig, AxisKind, AxisUnits, Periods};
-use virtual_axes_core::statistics::mean;
 use virtual_axes_core::units::{
     DEGREE, MICROSECOND_NS, MILLISECOND, Nanoseconds, POSITION_GAIN, Rounded, seconds,
 };
@@ -38,21 +34,6 @@ const BOTH_WAYS: f64 = 0.02;
 const SHORTEST_TRAVEL: f64 = 1e-3;
 /// Relative change of the gain from which that of the machine file does not fit.
 const GAIN_CHANGE: f64 = 0.15;
-/// Ratio of the residuals with and without feedforward from which the smaller one is certain.
-const CLEAR: f64 = 1.5;
-/// Ratio of two residuals that explain a motion alike.
-const ALIKE: f64 = 1.1;
-/// Largest number of instants of a position cycle that are compared; probability of the first one, and of the others together.
-const PHASES: usize = 48;
-const AT_SAMPLE: f64 = 1.0 / 3.0;
-const AT_OTHERS: f64 = 1.0 / 3.0;
-/// Velocity cycles by which β is moved, within its uncertainty.
-const BETA_SHIFTS: [i64; 5] = [-2, -1, 0, 1, 2];
-/// Bounds of the relative standard error of a simulated ripple, which is that of the bandwidth of the velocity loop.
-const LEAST_RIPPLE_ERROR: f64 = 0.05;
-const LARGEST_RIPPLE_ERROR: f64 = 0.5;
-/// Number of times that the plant is identified with the ripple of the loop.
-const PLANT_PASSES: usize = 2;
 /// Longest duration of motion of a recording that is simulated for delays and gains, s; all of it is compared at the end.
 const FITTED: f64 = 20.0;
 /// Part of the sampling period by which interpolated setpoints can move β and γ: they do not show where in a period the
@@ -149,19 +130,31 @@ fn identify_loop(
         duration: FITTED,
         fits_gain: scope.gain,
         given_gain,
+        has_plant,
     };
-    let mut findings = Vec::new();
-    let modes = active_feedforward(inputs, &found.axis, &mut findings, |recordings, lag| {
-        LoopProblem { recordings, ..problem }.rms_of_first(&found.axis, periods, lag)
-    });
-    let recordings: Vec<(&Signals, FeedforwardMode)> =
-        inputs.iter().zip(&modes).map(|(input, mode)| (input.signals, *mode)).collect();
-    let problem = LoopProblem { recordings: &recordings, ..problem };
-    let lag = mean_lag(&recordings, &found.axis);
-    let fit = lag.and_then(|lag| problem.fit(&found.axis, periods, lag));
-    found.findings.append(&mut findings);
+    let mut searches: Vec<FeedforwardSearch> =
+        inputs.iter().map(|input| FeedforwardSearch::new(input, (&found.axis, periods), problem)).collect();
+    let mut modes: Vec<FeedforwardMode> = searches.iter().map(FeedforwardSearch::mode).collect();
+    let identified = match searches.as_mut_slice() {
+        // The modes of a single recording are compared once plant and loop are those of each.
+        [search] => {
+            let (mode, identified) = search.converged(|mode, first| {
+                fit_loop(&[(inputs[0].signals, mode)], periods, (problem, first), found)
+            });
+            modes = vec![mode];
+            identified
+        }
+        _ => {
+            let recordings: Vec<(&Signals, FeedforwardMode)> =
+                inputs.iter().zip(&modes).map(|(input, mode)| (input.signals, *mode)).collect();
+            fit_loop(&recordings, periods, (problem, None), found)
+        }
+    };
+    for search in &searches {
+        search.report(&found.axis, &mut found.findings);
+    }
     found.active_feedforward = modes;
-    let Some(mut fit) = fit else {
+    let Some((fit, plant)) = identified else {
         found.findings.push(Finding::missing(
             "no-loop",
             "no delays and gains: the closed loop cannot be simulated near the recorded motion",
@@ -170,19 +163,9 @@ fn identify_loop(
         return;
     };
     let before = found.axis.clone();
-    for _ in 0..if has_plant { PLANT_PASSES } else { 0 } {
-        found.axis = fit.axis.clone();
-        let loggings = possible_loggings(&recordings, &fit);
-        let signals: Vec<&Signals> = recordings.iter().map(|(signals, _)| *signals).collect();
-        let Some(plant) = fit_plant(&signals, &found.axis, Some(&loggings)) else { break };
+    if let Some(plant) = plant {
         apply_plant(&plant, found);
         found.current_logging = plant.logging;
-        // The velocity loop keeps its bandwidth.
-        fit.axis = found.axis.clone();
-        match problem.renew(&fit.axis, &fit) {
-            Some(renewed) => fit = renewed,
-            None => break,
-        }
     }
     let interpolated =
         inputs.iter().filter(|input| is_interpolated(input.signals, seconds(fit.periods.position)));
@@ -191,73 +174,34 @@ fn identify_loop(
     report_interpolation(inputs, seconds(fit.periods.position), found);
 }
 
-/// Returns the ways in which the control can log the current: a mean over a position cycle, or an instant, most probably
-/// that of the sample. The position cycles are those that the positions permit.
-fn possible_loggings(recordings: &[(&Signals, FeedforwardMode)], fit: &LoopFit) -> CurrentLoggings {
-    let others = fit.alternatives.iter().map(|(axis, periods)| (axis, periods));
-    let cycles: Vec<(&AxisConfig, &Periods)> =
-        std::iter::once((&fit.axis, &fit.periods)).chain(others).collect();
-    let of = |parameter: LoopParameter| fit.values.iter().find(|value| value.parameter == parameter);
-    // The velocity feedforward steps once β has passed, within a position cycle.
-    let tsv = seconds(fit.periods.velocity);
-    let uncertain = of(LoopParameter::Beta).map_or(0.0, |beta| beta.error.hypot(tsv));
-    let shifts: &[i64] = if uncertain > 0.0 { &BETA_SHIFTS } else { &[0] };
-    let probability = |shift: i64| match shift {
-        0 => 1.0,
-        _ => (-0.5 * (shift as f64 * tsv / uncertain).powi(2)).exp(),
-    };
-    let all: f64 = shifts.iter().map(|shift| probability(*shift)).sum();
-    let mut instants = Vec::new();
-    for (cycle, (axis, periods)) in cycles.iter().enumerate() {
-        for shift in shifts {
-            let mut shifted = (*axis).clone();
-            shifted.delays.beta = (shifted.delays.beta + shift * periods.velocity).max(0);
-            let ripples = simulated_ripples(recordings, (&shifted, periods));
-            let later = ripples.len().saturating_sub(1).max(1) as f64;
-            for (offset, ripple) in ripples {
-                let share = if offset == 0.0 { AT_SAMPLE } else { AT_OTHERS / later };
-                let prior = share * probability(*shift) / (all * cycles.len() as f64);
-                let (inertia, is_identified) = (axis.motor.inertia, cycle == 0 && *shift == 0);
-                instants.push(LoggedInstant { offset, prior, is_identified, ripple, inertia });
-            }
-        }
-    }
-    let error = of(LoopParameter::Bandwidth)
-        .map_or(LARGEST_RIPPLE_ERROR, |bandwidth| bandwidth.error / bandwidth.value);
-    // A logger that delays the actual values by a part of a cycle leaves their phase unknown.
-    let is_phase_known = !fit.is_between_cycles();
-    CurrentLoggings { instants, error: error.clamp(LEAST_RIPPLE_ERROR, LARGEST_RIPPLE_ERROR), is_phase_known }
-}
-
-/// Returns the ripple of the current at the samples for each instant at which it can be logged, with its time behind the
-/// sample, s: the simulated current of that instant minus the mean over a position cycle around the sample.
-fn simulated_ripples(
+/// Fits the loop of recordings, from the minimum `first` of a search if there is one, and the plant from the current that this
+/// loop logs.
+fn fit_loop(
     recordings: &[(&Signals, FeedforwardMode)],
-    (axis, periods): (&AxisConfig, &Periods),
-) -> Vec<(f64, CurrentRipple)> {
-    let tsp = seconds(periods.position);
-    // Samples within position cycles have their own renewal.
-    let renewal = recordings.iter().map(|(signals, _)| signals.period).fold(tsp, f64::min);
-    let unknown = |(signals, _): &(&Signals, FeedforwardMode)| -> Vec<Vec<f64>> {
-        signals.spans.iter().map(|span| vec![f64::NAN; span.position.len()]).collect()
+    periods: &Periods,
+    (problem, first): (LoopProblem<'_>, Option<LoopMinimum>),
+    known: &Identification,
+) -> Option<(LoopFit, Option<PlantRegression>)> {
+    let problem = LoopProblem { recordings, ..problem };
+    let lag = mean_lag(recordings, &known.axis)?;
+    let first = match first {
+        Some(first) => first,
+        None => problem.polished(&known.axis, periods, problem.search(&known.axis, periods, lag)?)?,
     };
-    let phases = ((renewal / seconds(periods.current)).round() as usize).clamp(1, PHASES);
-    let mut found: Vec<(f64, CurrentRipple)> = (0..phases)
-        .map(|k| (k as f64 / phases as f64 * renewal, recordings.iter().map(unknown).collect()))
-        .collect();
-    for (k, (signals, mode)) in recordings.iter().enumerate() {
-        for experiment in trace_experiments(signals, k, periods, (*mode, 0.0, CurrentLogging::MEAN)) {
-            let Ok(history) = CurrentHistory::new(axis, periods, &experiment) else { continue };
-            let mean = history.logged(&experiment, CurrentLogging::MEAN);
-            for (offset, ripple) in &mut found {
-                let logging = CurrentLogging { offset: *offset, ..CurrentLogging::INSTANT };
-                let at = history.logged(&experiment, logging);
-                let to = ripple[k][experiment.span].iter_mut().skip(experiment.sample);
-                to.zip(at.iter().zip(&mean)).for_each(|(to, (at, mean))| *to = at - mean);
-            }
+    let mut fit = problem.fit(&known.axis, periods, first)?;
+    if !problem.has_plant {
+        return Some((fit, None));
+    }
+    let signals: Vec<&Signals> = recordings.iter().map(|(signals, _)| *signals).collect();
+    let plant = fit_plant(&signals, &fit.axis, Some(&possible_loggings(recordings, &fit)));
+    if let Some(plant) = &plant {
+        // The velocity loop keeps its bandwidth.
+        plant.apply(&mut fit.axis);
+        if let Some(renewed) = problem.renew(&fit.axis, &fit) {
+            fit = renewed;
         }
     }
-    found
+    Some((fit, plant))
 }
 
 /// Returns true if setpoints of position cycles of `tsp` s are interpolated between the samples of PSEC.
@@ -269,78 +213,6 @@ fn is_interpolated(signals: &Signals, tsp: f64) -> bool {
 /// Returns true if the samples lie at several phases of position cycles of `tsp` s, which the setpoints show.
 fn shows_cycles(signals: &Signals, span: &SignalSpan, tsp: f64) -> bool {
     signals.period < HELD * tsp && SetpointGrid::of(span, signals.period, tsp).is_some()
-}
-
-/// Returns the mean lag of the recordings behind PSEC, s, without that of the position loop.
-fn mean_lag(recordings: &[(&Signals, FeedforwardMode)], axis: &AxisConfig) -> Option<f64> {
-    let starts = recordings.iter().filter_map(|(signals, mode)| {
-        let (lag, _) = constant_lag(signals)?;
-        // Without feedforward the axis lags by 1 / Kp in addition.
-        let off = *mode == FeedforwardMode::Off;
-        Some(if off { (lag - 1.0 / axis.position_loop.gain).max(0.0) } else { lag })
-    });
-    mean(&starts.collect::<Vec<f64>>())
-}
-
-/// Returns the active feedforward of each recording: as given, as recorded, or with the smaller residual of the closed loop,
-/// `rms`. Of two that explain the motion alike, the one with less feedforward is taken.
-fn active_feedforward(
-    inputs: &[IdentificationInput<'_>],
-    axis: &AxisConfig,
-    findings: &mut Vec<Finding>,
-    rms: impl Fn(&[(&Signals, FeedforwardMode)], f64) -> Option<f64>,
-) -> Vec<FeedforwardMode> {
-    let mut of = |input: &IdentificationInput<'_>| {
-        if let Some(mode) = input.feedforward.or_else(|| recorded_feedforward(input.signals)) {
-            return mode;
-        }
-        let has_velocity = input.signals.spans.iter().any(|span| span.velocity_feedforward.is_some());
-        let modes = FeedforwardMode::ALL.into_iter().filter(|mode| match mode {
-            FeedforwardMode::Off => !has_velocity,
-            FeedforwardMode::Velocity => true,
-            FeedforwardMode::Both => axis.feedforward.torque != 0.0,
-        });
-        let tried = modes.filter_map(|mode| {
-            let recordings = [(input.signals, mode)];
-            Some((mode, rms(&recordings, mean_lag(&recordings, axis)?)?))
-        });
-        let tried: Vec<(FeedforwardMode, f64)> = tried.collect();
-        let least = tried.iter().map(|(_, rms)| *rms).fold(f64::INFINITY, f64::min);
-        let Some((mode, _)) = tried.iter().find(|(_, rms)| *rms <= ALIKE * least) else {
-            return FeedforwardMode::Both;
-        };
-        report_inferred((&input.signals.name, axis), (*mode, &tried), findings);
-        *mode
-    };
-    inputs.iter().map(&mut of).collect()
-}
-
-/// Reports a feedforward that was found by the residuals.
-fn report_inferred(
-    (recording, axis): (&str, &AxisConfig),
-    (mode, tried): (FeedforwardMode, &[(FeedforwardMode, f64)]),
-    findings: &mut Vec<Finding>,
-) {
-    let AxisUnits { error: unit, error_name: name, .. } = axis.units();
-    let residuals: Vec<String> =
-        tried.iter().map(|(mode, rms)| format!("{} {:.1} {name}", mode.name(), rms / unit)).collect();
-    let residuals = residuals.join(", ");
-    let least = |is_off: bool| {
-        let of_it = tried.iter().filter(|(mode, _)| (*mode == FeedforwardMode::Off) == is_off);
-        of_it.map(|(_, rms)| *rms).fold(f64::INFINITY, f64::min)
-    };
-    let (off, on) = (least(true), least(false));
-    if off.max(on) < CLEAR * off.min(on) {
-        findings.push(Finding::invalid(
-            "feedforward-unknown",
-            format!("{recording}: the motion does not show whether feedforward was active: RMS residuals {residuals}"),
-            "give --feedforward off, velocity or both",
-        ));
-    }
-    findings.push(Finding::note(
-        "feedforward-inferred",
-        format!("{recording}: feedforward {} is assumed: RMS residuals {residuals}", mode.name()),
-    ));
 }
 
 /// Returns true if a considerable part of the motion has each direction.
@@ -380,23 +252,11 @@ fn report_interpolation(inputs: &[IdentificationInput<'_>], tsp: f64, found: &mu
 
 /// Sets inertia, friction and gravity by the regression.
 fn apply_plant(plant: &PlantRegression, found: &mut Identification) {
-    let axis = &mut found.axis;
-    if is_inertia_known(plant) {
-        axis.motor.inertia = plant.inertia.value;
-    }
-    axis.friction = plant.friction.law.config;
-    if let (Some((weight, _)), AxisKind::Linear) = (plant.gravity.weight, axis.kind()) {
-        axis.gravity.weight = if plant.gravity.model == GravityCurrent::default() { 0.0 } else { weight };
-    }
+    plant.apply(&mut found.axis);
     // A constant does not describe the gravity of a rotary axis, which stays that of the machine file.
     found.gravity = Some(plant.gravity.clone()).filter(|_| found.axis.kind() == AxisKind::Linear);
-    found.inertia = is_inertia_known(plant).then(|| plant.inertia.clone());
+    found.inertia = plant.is_inertia_known().then(|| plant.inertia.clone());
     found.friction = Some(plant.friction.clone());
-}
-
-/// Returns true if the 95 % interval of the inertia is narrower than its value.
-fn is_inertia_known(plant: &PlantRegression) -> bool {
-    plant.inertia.value > INTERVAL * plant.inertia.error
 }
 
 /// Reports correlated values of the plant, and what was not identified.

@@ -138,7 +138,7 @@ mod tests {
         Signals {
             name,
             period,
-            is_renewal: false,
+            renewal: None,
             cutoff: (0.16 / period).min(100.0),
             trace_filter: None,
             torque_constant: None,

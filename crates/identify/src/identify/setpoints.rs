@@ -171,7 +171,7 @@ mod tests {
         let signals = |psec: Vec<f64>| Signals {
             name: String::new(),
             period: 1e-3,
-            is_renewal: false,
+            renewal: None,
             cutoff: 100.0,
             trace_filter: None,
             torque_constant: None,
@@ -202,7 +202,7 @@ mod tests {
         let signals = Signals {
             name: String::new(),
             period: 4e-3,
-            is_renewal: false,
+            renewal: None,
             cutoff: 100.0,
             trace_filter: None,
             torque_constant: None,

@@ -4,7 +4,7 @@ use super::current_lag::{self, HIGHEST_LAG, LOWEST_LAG};
 use super::filter::{GaussianFilter, MAX_CUTOFF_PERIOD, default_cutoff, deviation};
 use super::filtered_section::FilteredSection;
 use super::full_turns::without_resets;
-use super::held_samples::without_held_samples;
+use super::held_samples::{with_stamps_of_renewals, without_held_samples};
 use super::ordering::{drop_copies, sort_samples};
 use super::spans::{
     CHANNELS, CURRENT, NAMES, POSITION, PSEC, channels, extract_sections, is_smoother_over_stamps,
@@ -91,6 +91,9 @@ pub fn condition(
     let raw = unrolled.as_ref().unwrap_or(raw);
     let renewed = without_held_samples(raw, &mut findings);
     let raw = renewed.as_ref().unwrap_or(raw);
+    let is_held = renewed.is_some();
+    let (stamped, renewal) = with_stamps_of_renewals(raw, &mut findings).unzip();
+    let raw = stamped.as_ref().unwrap_or(raw);
     let mut ordered = sort_samples(raw, &mut findings)?;
     let mut columns = usable_columns(raw, &mut findings);
     let position = columns[POSITION].as_ref();
@@ -138,9 +141,9 @@ pub fn condition(
     separate_spans(&mut spans, period);
     let trace_filter = select_trace_filter(&raw.name, options)?;
     let (name, torque_constant) = (raw.name.clone(), raw.torque_constant());
-    let is_renewal = renewed.is_some();
+    let renewal = renewal.or(is_held.then_some(period));
     Ok((
-        Signals { name, period, is_renewal, cutoff, trace_filter, torque_constant, current_lag, spans },
+        Signals { name, period, renewal, cutoff, trace_filter, torque_constant, current_lag, spans },
         findings,
     ))
 }

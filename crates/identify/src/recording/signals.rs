@@ -56,8 +56,9 @@ pub struct Signals {
     pub name: String,
     /// Sampling period, s.
     pub period: f64,
-    /// True if the period is that at which the control renews its signals: the logger has repeated them in between.
-    pub is_renewal: bool,
+    /// Period at which the control renews its signals, s, if the samples show it: repeated ones, or ones that move smoothly at
+    /// the instants of the renewals only.
+    pub renewal: Option<f64>,
     /// Cut-off frequency (half power) of the filter of velocity, acceleration and smoothed current, Hz.
     pub cutoff: f64,
     /// Half-power frequency, Hz, of the low-pass filter of the control that all signals but PSEC have passed.
