@@ -1,7 +1,7 @@
 //! Samples that a logger repeats, since it samples faster than the control renews its signals.
 
 use super::{Finding, RawRecording};
-use virtual_axes_core::statistics::median;
+use virtual_axes_core::statistics::{mean, median};
 use virtual_axes_core::units::{MILLISECOND, Rounded};
 
 /// Share of the travel at one of several samples from which on the position is held between them.
@@ -15,6 +15,8 @@ const PHASES: i64 = 12;
 /// Roughness of the position over the instants at which it is renewed, relative to that over the stamps, from which on
 /// the samples are those of these instants.
 const SMOOTHER: f64 = 0.3;
+/// Largest mean distance of the stamps from uniform ones, in sampling periods.
+const JITTER: f64 = 0.1;
 /// Fewest samples that show it, and most that are compared.
 const FEWEST: usize = 40;
 const COMPARED: usize = 20_000;
@@ -78,6 +80,10 @@ pub(super) fn with_stamps_of_renewals(
     }
     let slots: Vec<f64> = raw.time.iter().map(|time| ((time - raw.time[0]) / period).round()).collect();
     let nominal: Vec<f64> = slots.iter().map(|slot| slot * period).collect();
+    let apart = raw.time.iter().zip(&nominal).map(|(time, slot)| (time - raw.time[0] - slot).abs());
+    if mean(&apart.collect::<Vec<f64>>())? > JITTER * period {
+        return None;
+    }
     let shown = nominal.len().min(COMPARED);
     let (before, count) = roughness(&nominal[..shown], position);
     let cycles = (2..=LONGEST_CYCLE).map(|cycle| cycle as f64 * MILLISECOND).filter(|cycle| {
