@@ -8,7 +8,7 @@ use virtual_axes_identify::identify::{
 };
 use virtual_axes_identify::recording::{Conditioning, RawRecording, Severity};
 use virtual_axes_verification::production_traces::{
-    AxisOrientation, CurrentSampling, HiddenAxis, ProductionProgram, TraceRecorder, machine_file,
+    AxisOrientation, CurrentSampling, HiddenAxis, ProductionProgram, TraceRecorder, machine_file, study,
 };
 
 /// Half width of a 95 % interval in standard errors.
@@ -155,4 +155,21 @@ fn correlations_of_the_joint_fit_are_those_of_a_covariance() {
     }
     // Gain and integral time of the velocity loop act alike.
     assert!(largest > 0.1, "{correlations:?}");
+}
+
+/// A trace with velocity feedforward only, whose current is logged at one instant of 6 ms cycles: before the inertia is that of
+/// this ripple, torque feedforward explains the motion better.
+#[test]
+fn feedforward_modes_are_compared_with_the_plant_of_each() {
+    let found = study(9_910_002, AxisOrientation::Horizontal, MILLISECOND_NS).expect("a study");
+    let inertia = found.acceleration.expect("an inertia");
+    assert!(inertia.error.abs() < 0.03 && found.invalid.is_empty(), "{found:?}");
+    assert!(found.beta.expect("a delay").error.abs() < 0.5e-3, "{found:?}");
+}
+
+#[test]
+fn samples_every_4_ms_of_cycles_of_6_ms_predict_an_unseen_program() {
+    let found = study(100_006, AxisOrientation::Horizontal, 4 * MILLISECOND_NS).expect("a study");
+    assert!(found.invalid.is_empty() && found.residuals[1].expect("a prediction") < 5e-6, "{found:?}");
+    assert!(found.acceleration.expect("an inertia").is_covered, "{found:?}");
 }
