@@ -104,6 +104,10 @@ pub fn condition(
     };
     let smoother = |placed: &UniformGrid| is_smoother_over_stamps(placed, position);
     let placed = assign_to_grid(&raw.name, &ordered, periods, smoother, &mut findings)?;
+    if stamped.is_some() {
+        // The note of the renewals is the reason: another clock would not help.
+        findings.retain(|finding| finding.code != "irregular");
+    }
     let period = placed.period;
     let cutoff = select_cutoff(&raw.name, options, &placed)?;
     let filter = GaussianFilter::new(cutoff, period);

@@ -499,6 +499,18 @@ fn irregular_sampling_is_interpolated() {
 }
 
 #[test]
+fn samples_of_renewals_are_not_called_irregular() {
+    // Samples every 20 ms of signals that are renewed every 6 ms have the stamps of the renewals, 18 and 24 ms apart.
+    let time: Vec<f64> = (0..600).map(|n| f64::from(n) * 20e-3).collect();
+    let renewal = |t: &f64| (t / 6e-3 + 1e-6).floor() * 6e-3;
+    let position = time.iter().map(|t| 0.2 * (3.0 * renewal(t)).sin()).collect();
+    let raw = RawRecording { time, position: Some(position), ..RawRecording::default() };
+    let (signals, findings) = run(&raw);
+    assert_eq!(codes(&findings), ["held-samples"]);
+    assert!(signals.renewal.is_some_and(|cycle| (cycle - 6e-3).abs() < 1e-9), "{:?}", signals.renewal);
+}
+
+#[test]
 fn samples_taken_at_their_stamps_are_interpolated() {
     // The sample count fits, but the position shows that the stamps are the sampling times.
     let mut raw = recording();
