@@ -1,9 +1,9 @@
 //! Active feedforward of a recording that does not contain it, by the residuals of the closed loop.
 
 use super::feedforward_mode::FeedforwardMode;
-use super::loop_fit::LoopFit;
 use super::loop_problem::LoopProblem;
 use super::loop_search::LoopMinimum;
+use super::loop_values::LoopFit;
 use super::options::IdentificationInput;
 use super::plant_regression::PlantRegression;
 use super::recorded_feedforward::recorded_feedforward;

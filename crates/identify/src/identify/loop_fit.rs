@@ -10,47 +10,13 @@ use super::fit::BoundedParameter;
 use super::loop_parameter::{LoopParameter, apply};
 use super::loop_problem::{LONGEST, LoopProblem, divides};
 use super::loop_search::LoopMinimum;
+use super::loop_values::{LoopFit, LoopValue};
 use super::position_cycles::{CycleMinimum, KEPT};
 use virtual_axes_core::config::{AxisConfig, Periods};
 use virtual_axes_core::units::seconds;
 
 /// Longest duration of a recording for the search, s.
 const SEARCHED: f64 = 6.0;
-/// Fitted value with an upper bound of its standard error.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct LoopValue {
-    pub parameter: LoopParameter,
-    pub value: f64,
-    pub error: f64,
-}
-
-/// Result of the fit.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct LoopFit {
-    /// Axis with fitted delays, gains and weights.
-    pub axis: AxisConfig,
-    /// Periods with the position cycle that divides the lag.
-    pub periods: Periods,
-    pub values: Vec<LoopValue>,
-    /// RMS position residual, m or rad.
-    pub rms: f64,
-    /// Correlations of the fitted values, in their order.
-    pub correlations: DMatrix<f64>,
-    /// RMS position residual with the gain of the machine file, if the gain was fitted.
-    pub rms_with_given_gain: Option<f64>,
-    /// Axes with other position cycles that explain the positions about as well.
-    pub alternatives: Vec<(AxisConfig, Periods)>,
-    /// VFFW and lag (s) at both ends of the valley in which the residual hardly changes.
-    pub valley: Option<[(f64, f64); 2]>,
-}
-
-impl LoopFit {
-    /// Returns true if the lag is no whole number of position cycles.
-    pub fn is_between_cycles(&self) -> bool {
-        let lag = self.values.iter().find(|value| value.parameter == LoopParameter::Lag);
-        lag.is_some_and(|lag| !divides(self.periods.position, lag.value))
-    }
-}
 
 impl LoopProblem<'_> {
     /// Returns the problem of a part of long recordings, for the search.

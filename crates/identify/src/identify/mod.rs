@@ -30,6 +30,7 @@ mod loop_parameter;
 mod loop_problem;
 mod loop_ripple;
 mod loop_search;
+mod loop_values;
 mod low_pass;
 mod moving_data;
 mod options;

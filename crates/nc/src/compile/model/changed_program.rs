@@ -4,7 +4,7 @@ use nalgebra::{Vector2, Vector3};
 use virtual_axes_core::units::MILLIMETER;
 
 use super::super::words::{WordLine, number, rounded};
-use super::{CutPiece, CutShape, LEAST_SWEEP, ProgramModel, steps};
+use super::program_model::{Changes, CutPiece, CutShape, LEAST_SWEEP, ProgramModel, steps};
 use crate::interpret::InterpreterOptions;
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates, Feed, PlanarArc, is_rotary};
 
@@ -13,17 +13,6 @@ const CENTERS: [char; 3] = ['I', 'J', 'K'];
 /// Largest difference of an end of a motion from the planned one after rounding, m, and rad.
 const ROUNDING: f64 = 4e-7;
 const ROTARY_ROUNDING: f64 = 1e-6;
-
-/// Changes of the points and feeds of a program.
-#[derive(Debug, Clone)]
-pub(in super::super) struct Changes {
-    /// Shift of each node, m.
-    pub shifts: Vec<Vector3<f64>>,
-    /// Change of the radius of each piece, m.
-    pub radii: Vec<f64>,
-    /// Factor of the feed of each piece.
-    pub feeds: Vec<f64>,
-}
 
 /// Text of a changed program.
 pub(in super::super) struct ChangedProgram {
