@@ -124,7 +124,10 @@ M2
 ";
     let part = folder.file("part.nc", text).to_string_lossy().into_owned();
     let out = folder.path("better.nc");
-    let report = json(&["compile", &part, "--same-time", "--more-time", "3", "--out", &out, "--json"]);
+    let output = run(&["compile", &part, "--same-time", "--more-time", "3", "--out", &out, "--json"]);
+    let report: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    let notes = String::from_utf8_lossy(&output.stderr);
+    assert!(notes.contains("part.nc:1: G20: lengths and feeds are in inches"), "{notes}");
     assert_eq!(report["is_changed"], true, "{report}");
     assert!(figure(&report, "after", "nominal") < figure(&report, "before", "nominal"));
     let better = std::fs::read_to_string(&out).expect("the program");
