@@ -2,7 +2,9 @@
 
 use std::io::Cursor;
 
-use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions, ProgramError};
+use virtual_axes_nc::interpret::{
+    Dialect, InterpretationReport, Interpreter, InterpreterOptions, ProgramError,
+};
 use virtual_axes_nc::motion::{Coordinates, ProgramEvent, ProgramMotion, ProgramStep};
 
 /// Returns the steps of a program.
@@ -37,6 +39,18 @@ pub fn error(text: &str) -> String {
         Ok(steps) => panic!("{text:?} gives {} steps", steps.len()),
         Err(error) => error.to_string(),
     }
+}
+
+/// Returns the report of a program with all its errors at once.
+pub fn report(text: &str, dialect: Dialect) -> InterpretationReport {
+    let options = InterpreterOptions {
+        dialect: Some(dialect),
+        reports_all_errors: true,
+        ..InterpreterOptions::default()
+    };
+    let mut interpreter = Interpreter::new(Cursor::new(text), "part.nc", options);
+    assert!(interpreter.by_ref().all(|step| step.is_ok()), "{text}");
+    interpreter.report().clone()
 }
 
 /// Returns X, Y and Z, mm.

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions, is_g_code};
 use virtual_axes_nc::motion::ProgramStep;
 
-use crate::common::{millimeters, steps};
+use crate::common::{millimeters, report, steps};
 
 /// Returns the end of the last motion of a file, mm, and the line of its motion.
 fn last(file: Vec<u8>) -> ([f64; 3], usize) {
@@ -108,14 +108,7 @@ fn other_formats_are_named_in_one_error() {
 #[test]
 fn motions_after_a_missing_feed_start_at_its_end() {
     let text = "G21 G90 G17 G0 X0 Y0\nG1 X10\nG2 X20 Y10 R10\nG2 X30 Y0 I0 J-10\nM2\n";
-    let options = InterpreterOptions {
-        dialect: Some(Dialect::LinuxCnc),
-        reports_all_errors: true,
-        ..InterpreterOptions::default()
-    };
-    let mut interpreter = Interpreter::new(std::io::Cursor::new(text), "part.nc", options);
-    assert!(interpreter.by_ref().all(|step| step.is_ok()));
-    let errors = &interpreter.report().errors;
+    let errors = report(text, Dialect::LinuxCnc).errors;
     let [(error, found)] = &errors.iter().collect::<Vec<_>>()[..] else { panic!("{errors:?}") };
     assert!(error.starts_with("feed missing") && found.count == 3, "{errors:?}");
 }
@@ -130,14 +123,7 @@ fn an_error_of_a_canned_cycle_has_no_consequences_in_its_next_lines() {
         (Dialect::Fanuc, "G83 X1. Y1. Z-3. R1. Q1. F100. G477", "G477 is not supported"),
     ] {
         let text = format!("G21 G90 G17 G0 Z5.\n{cycle}\nX5.\nX9. Y2.\nG80\nG0 Z9.\nM2\n");
-        let options = InterpreterOptions {
-            dialect: Some(dialect),
-            reports_all_errors: true,
-            ..InterpreterOptions::default()
-        };
-        let mut interpreter = Interpreter::new(std::io::Cursor::new(text), "part.nc", options);
-        assert!(interpreter.by_ref().all(|step| step.is_ok()));
-        let errors = &interpreter.report().errors;
+        let errors = report(&text, dialect).errors;
         let [(error, found)] = &errors.iter().collect::<Vec<_>>()[..] else { panic!("{cycle}: {errors:?}") };
         assert!(error.contains(expected) && found.count == 1 && found.first_line == 2, "{cycle}: {errors:?}");
     }

@@ -3,7 +3,7 @@
 use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions};
 use virtual_axes_nc::motion::{Feed, MotionKind, ProgramEvent, ProgramStep};
 
-use crate::common::{events, millimeters, motions};
+use crate::common::{events, millimeters, motions, report};
 
 /// Returns the detected dialect, and the ends of the motions, mm.
 fn detected(text: &str) -> (Dialect, Vec<[f64; 3]>) {
@@ -102,14 +102,7 @@ fn lines_of_firmware_are_texts_and_commands() {
 #[test]
 fn all_errors_of_a_program_are_reported_once_with_count_and_line() {
     let text = "G21 G90 G17\nG15\nG187 P1\nG0 X1\nG15 G187\nM450\nG1 X10 F500\nG12 I5\nG1 X20 Q7\nM2\n";
-    let options = InterpreterOptions {
-        dialect: Some(Dialect::LinuxCnc),
-        reports_all_errors: true,
-        ..InterpreterOptions::default()
-    };
-    let mut interpreter = Interpreter::new(std::io::Cursor::new(text), "part.nc", options);
-    assert!(interpreter.by_ref().all(|step| step.is_ok()));
-    let errors = &interpreter.report().errors;
+    let errors = report(text, Dialect::LinuxCnc).errors;
     let mut found: Vec<_> =
         errors.iter().map(|(text, found)| (found.first_line, found.count, text.as_str())).collect();
     found.sort_unstable();
