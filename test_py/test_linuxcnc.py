@@ -407,7 +407,7 @@ def test_a_compiled_program_halves_the_error_of_deviating_axes(tmp_path: Path, n
     program = PARTS[name]
     part, better = tmp_path / "part.ngc", tmp_path / "better.ngc"
     part.write_text(f"G21 G90 G94 G17 G64\n{program}\nM2\n")
-    options = ["--machine", "mikron_ucp710", "--work-offset", "G54=0,0,0", "--same-time", "--more-time", "2.8"]
+    options = ["--machine", "mikron_ucp710", "--work-offset", "G54=0,0,0", "--same-time", "--more-time", "2.4"]
     sets = [part for value in CONTROL for part in ("--set", value)]
     command = [COMMAND, "compile", part, *options, *sets, "--out", better, "-q"]
     subprocess.run(command, check=True, capture_output=True, timeout=400)
