@@ -13,6 +13,7 @@ import time
 import warnings
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import control
 import numpy as np
@@ -40,6 +41,9 @@ def machine() -> va.Machine:
         (lambda m: m.simulate(STILL.astype(complex)), TypeError, "complex128"),
         (lambda m: m.simulate([[0.0, 0.0], [0.0]]), ValueError, "rows of different lengths"),
         (lambda m: m.simulate({"x": ["a", "b"]}), TypeError, "psec of x"),
+        (lambda m: m.simulate({"x": 0.1}), ValueError, r"psec of x is one number; .*\[0\.1\]"),
+        (lambda m: va.nc_program("G0 X0\nM2\n"), ValueError, r"name_or_path is the text of a program; .*write_text"),
+        (lambda m: va.identify(SimpleNamespace(columns=[]), "x", m), ValueError, "recording has no columns"),
         (lambda m: m.simulate(STILL, signals="position"), TypeError, "signals is 'position'"),
         (lambda m: m.simulate(STILL, signals=["psec"]).following_error, ValueError, "'position' is not recorded"),
         (lambda m: m.simulate(STILL, signals=5), TypeError, "signals is 5; it must be a list"),

@@ -138,6 +138,12 @@ M2
     let output = run(&["run", &out, "--reference", &part, "--json"]);
     let found: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
     assert_eq!(max(&found), figure(&report, "after", "nominal"));
+    let warning = |output: &std::process::Output| {
+        String::from_utf8_lossy(&output.stderr).contains("is it the program that this one was compiled from")
+    };
+    assert!(!warning(&output));
+    let other = folder.file("other.nc", SQUARE).to_string_lossy().into_owned();
+    assert!(warning(&run(&["run", &out, "--reference", &other, "--json"])));
 }
 
 #[test]
@@ -149,8 +155,12 @@ fn a_tolerance_is_held_in_less_time_than_the_least_error_or_reported_as_not_held
     assert!(figure(&report, "after", "all_plants") <= 35.0);
     let corner = "G21 G90 G64 P0.01\nG1 X-30 F3000\nY-20\nM2\n";
     let corner = folder.file("corner.nc", corner).to_string_lossy().into_owned();
-    let verdict = printed(&["compile", &corner, "--tolerance-um", "0.1", "--quiet"]);
+    let output = run(&["compile", &corner, "--tolerance-um", "0.1", "--quiet"]);
+    let [verdict, error] =
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).expect("UTF-8"));
     assert!(verdict.ends_with("; tolerance 0.1 µm not held\n"), "{verdict}");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(error.contains("µm on line 2 is beyond the tolerance 0.1 µm"), "{error}");
     // A program within the tolerance needs no change.
     let out = folder.path("same.nc");
     let verdict = printed(&["compile", &part, "--tolerance-um", "500", "--quiet", "--out", &out]);
@@ -193,6 +203,7 @@ fn invalid_arguments_are_rejected() {
     assert_rejected(&["compile", &part, "--tolerance-um", "0"], &["must be in 0.1 … 10000"]);
     assert_rejected(&["compile", &part, "--same-time", "--feed-limit", "50"], &["must be in 100 … 1000"]);
     assert_rejected(&["compile", &part, "--same-time", "--out", &part], &["would replace an input file"]);
-    assert_rejected(&["compile", "ballbar", "--same-time"], &["ballbar: a part program is required"]);
+    let named = "ballbar: a part program is required; built-in ones are circle-diamond-square, ";
+    assert_rejected(&["compile", "ballbar", "--same-time"], &[named]);
     assert_rejected(&["run", "ballbar", "--reference", &part], &["--reference requires a part program"]);
 }

@@ -37,14 +37,11 @@ use virtual_axes_core::text::is_control;
 
 use crate::arguments::output_arguments::OutputFormat;
 use crate::list::completion;
+use crate::output::unusable::UnusableResult;
 use crate::output::{emphasis, interrupt, print_error, with_escaped_arguments, with_shown_arguments};
 
-/// Exit status of `check` if setpoints are beyond a limit.
-const BEYOND_LIMITS: u8 = 1;
 /// Exit status of a command that rejected its input or could not write its output.
 const BAD_INPUT: u8 = 2;
-/// Exit status of a command whose result must not be used.
-const INVALID_RESULT: u8 = 3;
 /// Errors of the standard library about a number, and what is required instead.
 const NUMBER_ERRORS: [(&str, &str); 4] = [
     ("invalid float literal", "must be a number, for example 2.5"),
@@ -162,16 +159,14 @@ fn main() -> ExitCode {
         Ok(text) if command.prints_verdict() => emphasis::with_bold_verdict(text),
         Ok(text) => text,
         Err(error) => {
-            if let Some(invalid) = error.downcast_ref::<identify::invalid_result::InvalidResult>() {
-                // The results are shown, with the reason why they must not be used.
-                let _ = io::stdout().write_all(invalid.text.as_bytes());
-                print_error(invalid);
-                return ExitCode::from(INVALID_RESULT);
-            }
-            if let Some(excess) = error.downcast_ref::<check::limit_audit_output::LimitExcess>() {
-                let _ = io::stdout().write_all(excess.text.as_bytes());
-                print_error(excess);
-                return ExitCode::from(BEYOND_LIMITS);
+            if let Some(unusable) = error.downcast_ref::<UnusableResult>() {
+                let text = match command.prints_verdict() {
+                    true => emphasis::with_bold_verdict(unusable.text.clone()),
+                    false => unusable.text.clone(),
+                };
+                let _ = io::stdout().write_all(with_escaped_arguments(text).as_bytes());
+                print_error(unusable);
+                return ExitCode::from(unusable.status);
             }
             print_error(&*error);
             return ExitCode::from(if interrupt::is_raised() { interrupt::INTERRUPTED } else { BAD_INPUT });

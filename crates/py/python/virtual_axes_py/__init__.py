@@ -114,6 +114,9 @@ def nc_program(
 
     Raises `ValueError` for other values.
     """
+    if isinstance(name_or_path, str) and "\n" in name_or_path:
+        text = "it must be a name or a path: pathlib.Path('part.nc').write_text(text) writes it to a file"
+        raise ValueError(f"name_or_path is the text of a program; {text}")
     arguments = {
         "feed_override": to_real("feed_override", feed_override),
         "ignore": [str(code) for code in ([ignore] if isinstance(ignore, int | str) else ignore)],

@@ -251,6 +251,8 @@ def _source(given: Any, options: Mapping[str, Any]) -> Source:
             raise ValueError(unknown("channel", wrong[0], CHANNELS))
         return _timed({name: _channel(name, values) for name, values in given.items()}, options)
     columns = None if isinstance(given, str | os.PathLike) else columns_of("recording", given, skip_texts=True)
+    if hasattr(given, "columns") and not len(given.columns):
+        raise ValueError("recording has no columns; it needs position and current, or those of `column`")
     if columns is None and not isinstance(given, str | bytes | os.PathLike):
         text = "it must be a path, a dictionary of channels, or a table, as Run.to_pandas() returns it"
         raise TypeError(f"recording is of type {type(given).__name__}; {text}")

@@ -53,6 +53,9 @@ def columns_of(name: str, given: Any, *, skip_texts: bool = False) -> dict[str, 
         except TypeError:
             if not skip_texts:
                 raise
+    single = next((title for title, column in found.items() if column.ndim == 0), None)
+    if single is not None:
+        raise ValueError(f"{name} of {single} is one number; it must have a value for each row, as [{found[single]}]")
     shapes = {column.shape for column in found.values()}
     if found and (len(shapes) != 1 or len(next(iter(shapes))) != 1):
         listed = ", ".join(f"{title} {column.shape}" for title, column in found.items())

@@ -1,7 +1,4 @@
-//! Table of the limit audit, and its error.
-
-use std::error::Error;
-use std::fmt;
+//! Table of the limit audit.
 
 use virtual_axes_core::assess::{AuditedAxis, LargestUse, LimitAudit, SetpointPlace};
 use virtual_axes_core::config::AxisUnits;
@@ -61,20 +58,3 @@ fn rows(axis: &AuditedAxis) -> Vec<Vec<String>> {
     }
     rows
 }
-
-/// Setpoints beyond a limit, with the output of the command.
-#[derive(Debug)]
-pub struct LimitExcess {
-    /// Output of the command.
-    pub text: String,
-    /// File, place and limit.
-    pub reason: String,
-}
-
-impl fmt::Display for LimitExcess {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.reason)
-    }
-}
-
-impl Error for LimitExcess {}

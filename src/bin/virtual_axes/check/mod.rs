@@ -28,8 +28,8 @@ use crate::input::setpoint_summary::SetpointSummary;
 use crate::input::{CommandInput, program_text};
 use crate::output::operations::operations_text;
 use crate::output::progress::TrialProgress;
+use crate::output::unusable::{BEYOND_LIMITS, UnusableResult};
 use crate::output::{interrupt, print_error, text_table};
-use limit_audit_output::LimitExcess;
 use row_audit::RowAudit;
 use virtual_axes_report::limit_audit;
 use virtual_axes_report::runs::{axis_warnings, time_shares};
@@ -247,7 +247,7 @@ struct AuditedInput<'a> {
 }
 
 impl AuditedInput<'_> {
-    /// Returns the output of the command, in [`LimitExcess`] if a limit is exceeded.
+    /// Returns the output of the command, in [`UnusableResult`] if a limit is exceeded.
     fn result(&self, mut audit: LimitAudit, as_json: bool) -> Result<String, Box<dyn Error>> {
         audit.finish();
         let excess = limit_audit::excess(&audit);
@@ -260,7 +260,10 @@ impl AuditedInput<'_> {
         };
         match excess {
             None => Ok(text),
-            Some(excess) => Err(Box::new(LimitExcess { text, reason: format!("{}: {excess}", self.name) })),
+            Some(excess) => {
+                let reason = format!("{}: {excess}", self.name);
+                Err(Box::new(UnusableResult { text, reason, status: BEYOND_LIMITS }))
+            }
         }
     }
 }

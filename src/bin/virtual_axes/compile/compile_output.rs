@@ -54,6 +54,23 @@ impl CompileOutput<'_> {
         )
     }
 
+    /// Returns the line and the error beyond the tolerance.
+    pub fn excess(&self) -> Option<String> {
+        let after = &self.found.figures[1];
+        let CompileAim::Tolerance(tolerance) = self.options.aim else { return None };
+        if after.worst <= tolerance {
+            return None;
+        }
+        let worst = self.found.lines.iter().max_by(|a, b| a.errors[1].total_cmp(&b.errors[1]));
+        let place = worst.map_or(String::new(), |worst| format!(" on line {}", worst.line));
+        Some(format!(
+            "contour error {:.1} µm{place} is beyond the tolerance {:.1} µm; allow more, lower the feed there, or the deviation \
+             of the plants (--by)",
+            after.worst / MICROMETER,
+            tolerance / MICROMETER
+        ))
+    }
+
     /// Returns verdict, changes and the lines with the largest errors.
     pub fn text(&self) -> String {
         let Compiled { eligible, left, counts: [points, extra, feeds], largest_shift, .. } = self.found;

@@ -21,8 +21,9 @@ use crate::arguments::variant;
 use crate::builtin::PROGRAMS;
 use crate::input::CommandInput;
 use crate::input::must_not_replace;
-use crate::input::part_program::PartProgramArguments;
+use crate::input::part_program::{PartProgramArguments, no_part_program};
 use crate::output::progress::Spinner;
+use crate::output::unusable::{BEYOND_LIMITS, UnusableResult};
 use crate::output::{interrupt, print_error};
 use compile_output::CompileOutput;
 
@@ -135,7 +136,7 @@ pub fn run(arguments: &CompileArguments) -> Result<String, Box<dyn Error>> {
     let config = variant::checked(&parameters, &machine, &arguments.machine)?;
     let input = CommandInput::open(&arguments.input, None, &LogArguments::default())?;
     if !input.is_part_program() {
-        return Err(format!("{}: a part program is required", arguments.input).into());
+        return Err(no_part_program(&arguments.input).into());
     }
     let input = input.with_part_program(&arguments.part_program)?;
     if let Some(out) = &arguments.out {
@@ -182,10 +183,17 @@ pub fn run(arguments: &CompileArguments) -> Result<String, Box<dyn Error>> {
         file.finish()?;
     }
     let output = CompileOutput { input: &input, machine: &config, options: &options, found: &found };
-    Ok(match arguments.output.format() {
+    let text = match arguments.output.format() {
         OutputFormat::Json => format!("{:#}\n", output.json()),
         OutputFormat::Csv => output.csv(),
         OutputFormat::Quiet => output.verdict(),
         OutputFormat::Text => output.text(),
-    })
+    };
+    match output.excess() {
+        None => Ok(text),
+        Some(excess) => {
+            let reason = format!("{}: {excess}", arguments.input);
+            Err(Box::new(UnusableResult { text, reason, status: BEYOND_LIMITS }))
+        }
+    }
 }

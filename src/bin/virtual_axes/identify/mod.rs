@@ -28,10 +28,10 @@ use crate::arguments::output_arguments::{OutputArguments, OutputFormat};
 use crate::arguments::{axis, variant};
 use crate::input::must_not_replace;
 use crate::output::progress::Spinner;
+use crate::output::unusable::{INVALID_RESULT, UnusableResult};
 use crate::output::{machine_file, report, text_table};
 use crate::psec::campaign::FeedforwardName;
 use axes::AxesResult;
-use invalid_result::InvalidResult;
 use machine_output::{machine_file_sentence, machine_text};
 use recordings::RecordingArguments;
 use refinement::{RefinedGroup, refined_groups};
@@ -139,7 +139,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<String, Box<dyn Error>> {
     let Some(axes) = arguments.axes() else { return listing(arguments) };
     run_axes(arguments, axes).map_err(|error| {
         // A new machine has all axes without --axis.
-        let is_listed = arguments.new_machine.is_none() && !error.is::<InvalidResult>();
+        let is_listed = arguments.new_machine.is_none() && !error.is::<UnusableResult>();
         match is_listed && next_command::is_corrected(&error.to_string(), &arguments.reading) {
             true => format!("{error}; without --axis, the command with all such units is printed").into(),
             false => error,
@@ -182,7 +182,7 @@ fn run_axes(arguments: &IdentifyArguments, axes: &str) -> Result<String, Box<dyn
     if arguments.new_machine.is_some() && !is_single(arguments) {
         excluded = axes::exclude(&mut found, &mut failures, &mut identified)?;
     }
-    let invalid = InvalidResult::reason(found.iter().map(|found| &found.summary), &failures);
+    let invalid = invalid_result::reason(found.iter().map(|found| &found.summary), &failures);
     spinner.set_activity("writing")?;
     if let Some(page) = &arguments.report {
         write_report(page, &found, &machine_file_sentence(arguments.out.as_deref(), invalid.is_some()))?;
@@ -195,7 +195,11 @@ fn run_axes(arguments: &IdentifyArguments, axes: &str) -> Result<String, Box<dyn
     }
     if let Some(reason) = invalid {
         drop(spinner);
-        return Err(Box::new(InvalidResult { text: joined(arguments, &summaries, &texts)?, reason }));
+        return Err(Box::new(UnusableResult {
+            text: joined(arguments, &summaries, &texts)?,
+            reason,
+            status: INVALID_RESULT,
+        }));
     }
     if let Some(out) = &arguments.out {
         let machine = arguments.new_machine.is_none().then_some(arguments.machine.as_str());

@@ -19,7 +19,7 @@ use crate::arguments::log_arguments::LogArguments;
 use crate::arguments::output_arguments::{OutputArguments, OutputFormat};
 use crate::arguments::variant;
 use crate::builtin::PROGRAMS;
-use crate::input::part_program::PartProgramArguments;
+use crate::input::part_program::{PartProgramArguments, no_part_program};
 use crate::input::{CommandInput, must_not_replace};
 use crate::output::{interrupt, machine_file};
 use control_output::ControlOutput;
@@ -61,7 +61,7 @@ pub fn run(arguments: &IdentifyControlArguments) -> Result<String, Box<dyn Error
     let config = variant::checked(&parameters, &machine, &arguments.machine)?;
     let program = CommandInput::open(&arguments.program, None, &LogArguments::default())?;
     if !program.is_part_program() {
-        return Err(format!("{}: a part program is required", arguments.program).into());
+        return Err(no_part_program(&arguments.program).into());
     }
     let program = program.with_part_program(&arguments.part_program)?;
     let input = CommandInput::open(&arguments.setpoints, None, &arguments.log)?.with_kept_rows();

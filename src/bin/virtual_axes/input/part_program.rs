@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufRead, Read};
 use std::path::{Path, PathBuf};
 
-use virtual_axes_core::text::builtin_text;
+use virtual_axes_core::text::{builtin_names, builtin_text};
 use virtual_axes_io::files::{self, InputError};
 use virtual_axes_nc::builtin::open_program;
 use virtual_axes_nc::interpret::{CodePattern, Dialect, IgnoredCodes, ToolTable, WorkOffset, is_g_code};
@@ -53,6 +53,12 @@ pub struct PartProgramArguments {
     /// Bound of the centripetal acceleration of the tool tip of a part program, m/s² [default: none besides the axes'].
     #[arg(long, value_name = "M_S2", value_parser = positive, allow_negative_numbers = true)]
     centripetal_m_s2: Option<f64>,
+}
+
+/// Returns the error of an input that is no part program.
+pub fn no_part_program(name: &str) -> String {
+    let names: Vec<&str> = builtin_names(PROGRAMS).collect();
+    format!("{name}: a part program is required; built-in ones are {}", names.join(", "))
 }
 
 impl PartProgramArguments {

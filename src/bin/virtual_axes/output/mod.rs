@@ -7,6 +7,7 @@ pub mod operations;
 pub mod progress;
 pub mod report;
 pub mod text_table;
+pub mod unusable;
 
 use std::env;
 use std::fmt::Display;

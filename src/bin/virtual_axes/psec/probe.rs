@@ -12,6 +12,9 @@ use virtual_axes_nc::interpret::WorkOffset;
 use crate::arguments::variant;
 use crate::input::must_not_replace;
 
+/// Extensions of files with setpoints.
+const SETPOINTS: [&str; 3] = ["csv", "mcap", "yaml"];
+
 /// Arguments of `virtual_axes psec --probe`.
 #[derive(Debug, clap::Args)]
 pub struct ProbeArguments {
@@ -32,6 +35,13 @@ pub struct ProbeArguments {
 
 /// Writes the program and returns an empty text.
 pub fn run(arguments: &ProbeArguments) -> Result<String, Box<dyn Error>> {
+    if arguments.out.extension().is_some_and(|extension| SETPOINTS.iter().any(|known| extension == *known)) {
+        let out = arguments.out.display();
+        return Err(format!(
+            "--out {out}: --probe writes a part program, no setpoints; for example probe.nc"
+        )
+        .into());
+    }
     must_not_replace(&arguments.out, Path::new(&arguments.machine))?;
     let machine = Parameters::load(&arguments.machine, crate::builtin::MACHINES)?;
     let config = variant::parameters(&machine, None, &arguments.set, &[])?.machine_config()?;

@@ -29,8 +29,11 @@ use crate::input::setpoint_summary::SetpointSummary;
 use crate::input::{CommandInput, program_text};
 use crate::output::operations::operations_text;
 use crate::output::report::{self, ReportMachine};
-use crate::output::{interrupt, text_table};
+use crate::output::{interrupt, print_error, text_table};
 use period::PeriodArgument;
+
+/// Distance from the path of `--reference` above which it is another one, m.
+const OTHER_REFERENCE: f64 = 2e-3;
 
 /// Arguments of `virtual_axes run`.
 #[derive(Debug, clap::Args)]
@@ -185,11 +188,25 @@ fn trial(
             let track = input.track().borrow();
             let figures = lines.finish(input.name(), PROGRAMS, &track, |cycle| path.add(cycle))?;
             path.texts = line_texts(input.name(), PROGRAMS, &path.lines())?;
+            if let (Some(reference), Some(cuts)) = (&arguments.reference, &figures.cuts) {
+                warn_of_other_reference(reference, cuts.blending);
+            }
             Some(ProgramReport { figures, path })
         }
         None => None,
     };
     Ok((outcome, summary, part_program))
+}
+
+/// Warns of a reference whose path is not that of the program; `distance` is the largest one of the planned path, m.
+fn warn_of_other_reference(reference: &str, distance: f64) {
+    if distance > OTHER_REFERENCE {
+        print_error(&format!(
+            "warning: --reference {reference}: the cuts are planned up to {:.1} mm away from its path; is it the program that this \
+             one was compiled from, with the same work offset?",
+            1e3 * distance
+        ));
+    }
 }
 
 /// Writer of signals at the trace period.
