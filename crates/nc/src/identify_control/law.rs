@@ -20,6 +20,8 @@ const RELATIVE: f64 = 1e-3;
 const OF_PERIOD: f64 = 0.1;
 /// Length of filters, in sampling periods, up to which they count as interpolation of the sampled setpoints.
 const INTERPOLATION: f64 = 3.0;
+/// Smallest sum of squares of filters, as a multiple of that of the drives.
+pub(super) const FILTER_SHARE: f64 = 2.0;
 /// Ratio of residuals from which one model is better than another.
 const BETTER: f64 = 0.25;
 /// Relative difference of the squares of equal ramps.
@@ -230,7 +232,7 @@ impl RampLaw {
             let half_width = (0.5 * value * deviation / slope).max(1e-4 * value);
             law.accelerations[axis] = Some(ControlEstimate { value, half_width, count: ramps[axis].len() });
         }
-        if squares < (INTERPOLATION * period).powi(2).max(2.0 * drive_squares) {
+        if squares < (INTERPOLATION * period).powi(2).max(FILTER_SHARE * drive_squares) {
             return Some(law);
         }
         let jerks: Option<Vec<Fit>> = axes

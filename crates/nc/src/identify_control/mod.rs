@@ -26,7 +26,7 @@ pub use self::probe::probe_program;
 
 use self::blocks::Blocks;
 use self::corner::LineCorner;
-use self::law::{ControlEstimate, RampLaw, Smoothing};
+use self::law::{ControlEstimate, FILTER_SHARE, RampLaw, Smoothing};
 use self::ramp::{SpeedRamp, plateau, ramp};
 use self::track::{Track, TrackedMotion, motions};
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, PathControl, ProgramStep};
@@ -101,7 +101,7 @@ pub fn identify_control<E: std::fmt::Display>(
             value.half_width = value.half_width.hypot(OF_DRIVES * value.value);
         }
         let hidden = match axes.law.as_ref().map(|law| &law.smoothing) {
-            Some(Smoothing::None(_)) => Some("filters below 6 ms"),
+            Some(Smoothing::None(_)) => Some("filters as short as those of the drives"),
             Some(Smoothing::Filters(stages)) if stages.len() == 1 => {
                 Some("a second filter below a third of the first")
             }
@@ -442,6 +442,8 @@ struct Axes<'a> {
     rapids: Vec<Vec<f64>>,
     moving: [bool; AXIS_COUNT],
     law: Option<RampLaw>,
+    /// Length of the shortest filter that the drives do not hide, s; 0 with setpoints.
+    shortest: f64,
 }
 
 impl<'a> Axes<'a> {
@@ -453,6 +455,7 @@ impl<'a> Axes<'a> {
             rapids: vec![Vec::new(); AXIS_COUNT],
             moving: [false; AXIS_COUNT],
             law: None,
+            shortest: (FILTER_SHARE * track.log.accuracy.drive_squares).sqrt(),
         };
         for (index, motion) in track.motions.iter().enumerate() {
             for axis in 0..AXIS_COUNT {
@@ -567,7 +570,10 @@ impl<'a> Axes<'a> {
             Smoothing::None(time) => choose(
                 "control.jerk_limited",
                 "false",
-                format!("the acceleration is constant, smoothed over {:.1} ms at most", 1e3 * time),
+                format!(
+                    "the acceleration is constant, smoothed over {:.1} ms at most",
+                    1e3 * time.max(self.shortest)
+                ),
             ),
             Smoothing::Filters(_) => {
                 choose(
