@@ -53,13 +53,13 @@ impl LineCorner {
             return None;
         }
         let period = track.log.period;
-        let resolution = track.log.resolution;
+        let resolution = track.log.accuracy.resolution;
         let constant = |motion: usize| {
             let [start, end] = track.samples[motion];
             let places = track.places(motion, start..end);
-            let plateau = plateau(&places, resolution)?;
+            let plateau = plateau(&places, track.log.accuracy)?;
             let middle = usize::midpoint(plateau.ends[0], plateau.ends[1]);
-            Some((start + middle, places[middle], plateau.step / period))
+            Some((start + middle, plateau.place, plateau.step / period))
         };
         let (before, place, feed) = constant(index)?;
         let (after, next_place, next_feed) = constant(index + 1)?;
@@ -83,7 +83,13 @@ impl LineCorner {
         let moving = (0..AXIS_COUNT).filter(|&i| directions.iter().any(|direction| direction[i] != 0.0));
         let limit = moving.filter_map(acceleration).fold(f64::INFINITY, f64::min);
         let lines = Lines { turn, feed, lost, accelerations, jerks };
-        let filters = law.filters();
+        let mut filters = law.filters();
+        let smoothing = track.log.accuracy.smoothing;
+        match filters.as_mut_slice() {
+            _ if smoothing == 0.0 => (),
+            [] | [_] => filters.push(smoothing),
+            [.., last] => *last = last.hypot(smoothing),
+        }
         let most = 0.5 * first.length.min(second.length) / (0.5 * turn).tan();
         let path = |radius: f64| lines.distance(radius, lines.speed(radius), &filters);
         // The influence of the sampling on the distance of an exact corner.

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::ramp::SpeedRamp;
+use super::ramp::{SpeedRamp, distance};
 
 /// Value with the half width of its interval of 95 %.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,6 +20,8 @@ const RELATIVE: f64 = 1e-3;
 const OF_PERIOD: f64 = 0.1;
 /// Length of filters, in sampling periods, up to which they count as interpolation of the sampled setpoints.
 const INTERPOLATION: f64 = 3.0;
+/// Smallest sum of squares of filters, as a multiple of that of the drives.
+pub(super) const FILTER_SHARE: f64 = 2.0;
 /// Ratio of residuals from which one model is better than another.
 const BETTER: f64 = 0.25;
 /// Relative difference of the squares of equal ramps.
@@ -32,6 +34,13 @@ const LEAST_SHARE: f64 = 0.1;
 const JERK_STARTS: [f64; 6] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0];
 /// Smallest ratio of the stages of a filter.
 const LEAST_STAGE: f64 = 0.05;
+/// Ratio of residuals up to which two stages are better than one.
+const TWO_STAGES: f64 = 0.8;
+/// Number of times that the range of their ratio loses a third, and step for the growth of the residual with it.
+const THIRDS: usize = 25;
+const RATIO_STEP: f64 = 0.05;
+/// Shortest length of a box in the shape of a ramp, sampling periods.
+const LEAST_BOX: f64 = 0.3;
 
 impl ControlEstimate {
     /// Returns the median of values; the interval is that of the mean, and at least `relative` of the value.
@@ -79,7 +88,7 @@ struct Fit {
 }
 
 fn sigma(ramp: &SpeedRamp, period: f64) -> f64 {
-    RELATIVE * ramp.squares.abs() + OF_PERIOD * period * period
+    RELATIVE * ramp.squares.abs() + OF_PERIOD * period * period + ramp.deviation
 }
 
 /// Solves weighted linear equations; `rows` has coefficients and right-hand sides, divided by their uncertainty.
@@ -176,8 +185,8 @@ fn fit_jerk(ramps: &[SpeedRamp], period: f64, start: [f64; 2]) -> Option<Fit> {
 }
 
 impl RampLaw {
-    /// Fits the ramps of all axes; `None` without a ramp.
-    pub fn fit(ramps: &[Vec<SpeedRamp>], period: f64) -> Option<Self> {
+    /// Fits the ramps of all axes; `None` without a ramp. Drives can add `drive_squares`, s², to the squares.
+    pub fn fit(ramps: &[Vec<SpeedRamp>], period: f64, drive_squares: f64) -> Option<Self> {
         let axes: Vec<usize> = (0..ramps.len()).filter(|&axis| !ramps[axis].is_empty()).collect();
         if axes.is_empty() {
             return None;
@@ -199,7 +208,6 @@ impl RampLaw {
             speeds.clone().fold(0.0, f64::max) > 1.3 * speeds.fold(f64::INFINITY, f64::min)
         });
         let filtered = least_squares(&rows, unknowns).filter(|_| has_two_speeds);
-        let threshold = (INTERPOLATION * period).powi(2);
         let squares = filtered.as_ref().map_or(0.0, |fit| fit.values[unknowns - 1]);
         let mut law = Self {
             accelerations: vec![None; ramps.len()],
@@ -224,7 +232,7 @@ impl RampLaw {
             let half_width = (0.5 * value * deviation / slope).max(1e-4 * value);
             law.accelerations[axis] = Some(ControlEstimate { value, half_width, count: ramps[axis].len() });
         }
-        if squares < threshold {
+        if squares < (INTERPOLATION * period).powi(2).max(FILTER_SHARE * drive_squares) {
             return Some(law);
         }
         let jerks: Option<Vec<Fit>> = axes
@@ -246,8 +254,11 @@ impl RampLaw {
                 for (fit, &axis) in jerks.iter().zip(&axes) {
                     let of = |k: usize| {
                         let value = fit.values[k].exp();
-                        let half_width =
-                            value * (COVERAGE * fit.covariance[(k, k)].max(0.0).sqrt()).max(1e-4);
+                        // A square of the time a/j off by that of the drives.
+                        let jerk_time = (fit.values[0] - fit.values[1]).exp();
+                        let of_drives = k as f64 * 0.5 * drive_squares / (jerk_time * jerk_time);
+                        let deviation = COVERAGE * fit.covariance[(k, k)].max(0.0).sqrt();
+                        let half_width = value * deviation.hypot(of_drives).max(1e-4);
                         Some(ControlEstimate { value, half_width, count: ramps[axis].len() })
                     };
                     law.accelerations[axis] = of(0);
@@ -258,6 +269,7 @@ impl RampLaw {
             }
         }
         let deviation = COVERAGE * fit.covariance[(unknowns - 1, unknowns - 1)].max(0.0).sqrt();
+        let deviation = deviation.hypot(drive_squares);
         law.smoothing = Smoothing::Filters(stages(ramps, &law.accelerations, [squares, deviation], period));
         Some(law)
     }
@@ -325,29 +337,58 @@ fn stages(
     [squares, deviation]: [f64; 2],
     period: f64,
 ) -> Vec<ControlEstimate> {
-    // Slow ramps show the filters best.
-    let mut fourth_powers = Vec::new();
-    for (ramps, acceleration) in ramps.iter().zip(accelerations) {
-        for ramp in ramps {
-            let Some(a) = acceleration else { continue };
-            let box_length = ramp.speed / a.value;
-            if box_length * box_length < 0.3 * squares {
-                fourth_powers.push(ramp.fourth_powers - box_length.powi(4));
-            }
-        }
-    }
-    let count = ramps.iter().map(Vec::len).sum();
-    let of = |square: f64, deviation: f64| {
-        let value = square.sqrt();
-        ControlEstimate { value, half_width: (0.5 * deviation / value).max(0.05 * period), count }
+    // Ramps that are shorter than the filters.
+    let shown: Vec<(&SpeedRamp, f64)> = ramps
+        .iter()
+        .zip(accelerations)
+        .filter_map(|(ramps, a)| Some(ramps.iter().zip(std::iter::repeat((*a)?.value))))
+        .flatten()
+        .map(|(ramp, a)| (ramp, ramp.speed / a))
+        .filter(|(_, length)| length * length < squares)
+        .collect();
+    let split = |ratio: f64| {
+        let first = (squares / (1.0 + ratio * ratio)).sqrt();
+        [first, ratio * first]
     };
-    let one = vec![of(squares, deviation)];
-    let Some(sum) = ControlEstimate::of(fourth_powers, 0.0) else { return one };
-    let difference = (2.0 * sum.value - squares * squares).max(0.0).sqrt();
-    let [first, second] = [0.5 * (squares + difference), 0.5 * (squares - difference)];
-    if second < LEAST_STAGE * LEAST_STAGE * first || second < period * period {
-        return one;
+    let residual = |ratio: f64| -> f64 {
+        let boxes = split(ratio);
+        shown.iter().map(|(ramp, length)| shape_residual(ramp, [boxes[0], boxes[1], *length], period)).sum()
+    };
+    let [mut low, mut high] = [0.0, 1.0];
+    for _ in 0..THIRDS {
+        let third = (high - low) / 3.0;
+        if residual(low + third) < residual(high - third) { high -= third } else { low += third }
     }
-    let spread = deviation + sum.half_width / squares;
-    vec![of(first, spread), of(second, spread)]
+    let ratio = f64::midpoint(low, high);
+    let [first, second] = split(ratio);
+    let count = ramps.iter().map(Vec::len).sum();
+    let of =
+        |value: f64, spread: f64| ControlEstimate { value, half_width: spread.max(0.05 * period), count };
+    let of_sum = |value: f64| 0.5 * deviation * value / squares;
+    let least = residual(ratio);
+    if shown.is_empty() || ratio < LEAST_STAGE || second < period || least > TWO_STAGES * residual(0.0) {
+        let value = squares.sqrt();
+        return vec![of(value, of_sum(value))];
+    }
+    // The residual grows with the square of an error of the ratio. The four ramps of a feed are alike.
+    let step = RATIO_STEP.min(0.5 * ratio);
+    let growth = (residual(ratio - step) - least) / (step * step);
+    let spread = COVERAGE * (least / ((0.25 * shown.len() as f64) * growth.max(f64::MIN_POSITIVE))).sqrt();
+    let of_ratio = spread * first / (1.0 + ratio * ratio);
+    vec![of(first, of_sum(first).hypot(ratio * of_ratio)), of(second, of_sum(second).hypot(of_ratio))]
+}
+
+/// Returns the sum of squares by which the positions of a ramp differ from those of boxes, apart from a shift in time.
+fn shape_residual(ramp: &SpeedRamp, boxes: [f64; 3], period: f64) -> f64 {
+    let lengths: Vec<f64> =
+        boxes.iter().map(|length| length / period).filter(|length| *length > LEAST_BOX).collect();
+    let [mut square, mut product, mut slopes] = [0.0; 3];
+    for [time, place] in &ramp.shape {
+        let error = place - distance(*time, &lengths);
+        let slope = distance(time + 0.5, &lengths) - distance(time - 0.5, &lengths);
+        square += error * error;
+        product += error * slope;
+        slopes += slope * slope;
+    }
+    (square - product * product / slopes.max(f64::MIN_POSITIVE)).max(0.0) * ramp.speed * ramp.speed
 }

@@ -4,13 +4,33 @@ use virtual_axes_core::config::MachineConfig;
 
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates};
 
+/// Accuracy of the setpoints of a log.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LogAccuracy {
+    /// Value of the last digit of setpoints, or deviation of estimated ones, m or rad.
+    pub resolution: f64,
+    /// Samples over which a speed is taken: 1 for setpoints, more for estimated ones.
+    pub window: usize,
+    /// Length of a moving average that rounds corners as the estimate does, s; 0 for setpoints.
+    pub smoothing: f64,
+    /// Sum of squares that the drives can add to that of a ramp, s²; 0 for setpoints.
+    pub drive_squares: f64,
+}
+
+impl LogAccuracy {
+    /// Returns true for setpoints that are estimated from recorded positions.
+    pub fn is_estimated(&self) -> bool {
+        self.window > 1
+    }
+}
+
 /// Setpoints of a control at a constant sampling period.
 #[derive(Debug, Clone)]
 pub struct ControlLog {
     /// Sampling period, s.
     pub period: f64,
-    /// Value of the last digit of the positions, m or rad.
-    pub resolution: f64,
+    /// Accuracy of the setpoints.
+    pub(super) accuracy: LogAccuracy,
     /// Positions of X, Y, Z, A, B, C, U, V, W, m or rad; 0 for an axis that the log lacks.
     pub positions: Vec<Coordinates>,
     /// True for the axes that the log has.
@@ -45,7 +65,7 @@ impl ControlLog {
         let axes: Vec<Option<usize>> = axes.collect();
         let mut log = Self {
             period,
-            resolution,
+            accuracy: LogAccuracy { resolution, window: 1, smoothing: 0.0, drive_squares: 0.0 },
             positions: Vec::with_capacity(rows.len()),
             has_axis: [false; AXIS_COUNT],
         };

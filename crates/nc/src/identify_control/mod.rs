@@ -1,4 +1,5 @@
-//! Profile of a control, from a part program and the setpoints that the control made of it.
+//! Profile of a control, from a part program and the setpoints that the control made of it, or the positions of the axes
+//! (`recorded_positions`).
 //!
 //! 1. Each sample of the log is assigned to a motion of the program.
 //! 2. Ramps from rest to a constant speed show acceleration, jerk limit and filters of the axes (`ramp`, `law`).
@@ -13,6 +14,7 @@ mod law;
 mod log;
 mod probe;
 mod ramp;
+mod recorded_positions;
 mod track;
 
 use virtual_axes_core::config::{AxisKind, MachineConfig};
@@ -24,7 +26,7 @@ pub use self::probe::probe_program;
 
 use self::blocks::Blocks;
 use self::corner::LineCorner;
-use self::law::{ControlEstimate, RampLaw, Smoothing};
+use self::law::{ControlEstimate, FILTER_SHARE, RampLaw, Smoothing};
 use self::ramp::{SpeedRamp, plateau, ramp};
 use self::track::{Track, TrackedMotion, motions};
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, PathControl, ProgramStep};
@@ -94,9 +96,26 @@ pub fn identify_control<E: std::fmt::Display>(
         identify_ends(&track, law, &mut found);
     }
     identify_wait(&track, &axes, &mut found);
+    if log.accuracy.is_estimated() {
+        for value in &mut found.values {
+            value.half_width = value.half_width.hypot(OF_DRIVES * value.value);
+        }
+        let hidden = match axes.law.as_ref().map(|law| &law.smoothing) {
+            Some(Smoothing::None(_)) => Some("filters as short as those of the drives"),
+            Some(Smoothing::Filters(stages)) if stages.len() == 1 => {
+                Some("a second filter below a third of the first")
+            }
+            _ => None,
+        };
+        found.not_shown.extend(
+            hidden.map(|what| format!("{what}: recorded positions do not show them beside the drives")),
+        );
+    }
     Ok(found)
 }
 
+/// Relative uncertainty of values from recorded positions, by drives that differ from those of the machine.
+const OF_DRIVES: f64 = 0.01;
 /// Relative difference up to which a part is a whole.
 const WHOLE: f64 = 0.015;
 /// A rule of arcs has more than one arc in this number of corners.
@@ -244,7 +263,7 @@ fn identify_circles(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentif
         let limits = arc.plane.map(|axis| law.accelerations[axis].map(|a| a.value));
         let [Some(x), Some(y)] = limits else { continue };
         let places = track.places(index, before.saturating_sub(5)..track.samples[index][1]);
-        let Some(constant) = plateau(&places, track.log.resolution) else { continue };
+        let Some(constant) = plateau(&places, track.log.accuracy) else { continue };
         let speed = constant.step / period;
         let limit = x.min(y);
         if speed < CORNER_SPEEDS[1] * motion.feed {
@@ -326,7 +345,7 @@ fn identify_ends(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentifica
         let scale = (motion.to[axis] - motion.from[axis]).abs() / motion.length;
         let places = track.places(index, before.saturating_sub(5)..track.samples[index][1]);
         let places: Vec<f64> = places.iter().map(|place| place * scale).collect();
-        let Some(constant) = plateau(&places, track.log.resolution) else { continue };
+        let Some(constant) = plateau(&places, track.log.accuracy) else { continue };
         let Some(ramp) = ramp(&places, &constant, period) else { continue };
         let acceleration = match law.is_limit(&ramp, axis) {
             true => Some(limit.value),
@@ -369,9 +388,9 @@ fn identify_wait(track: &Track<'_>, axes: &Axes<'_>, found: &mut ControlIdentifi
         let axis = motion.single_axis()?;
         let [start, end] = track.samples[index];
         let places = track.places(index, start..end);
-        let constant = plateau(&places, track.log.resolution)?;
+        let constant = plateau(&places, track.log.accuracy)?;
         let middle = usize::midpoint(constant.ends[0], constant.ends[1]);
-        let at = |place: f64| (start + middle) as f64 + (place - places[middle]) / constant.step;
+        let at = |place: f64| (start + middle) as f64 + (place - constant.place) / constant.step;
         let speed = constant.step / period * (motion.to[axis] - motion.from[axis]).abs() / motion.length;
         let ramp = axes.law.as_ref()?.ramp_time(axis, speed)?;
         axes.reaches(axis, motion, speed).then(|| (at(0.0) * period, at(motion.length) * period, 0.5 * ramp))
@@ -389,7 +408,7 @@ fn identify_wait(track: &Track<'_>, axes: &Axes<'_>, found: &mut ControlIdentifi
     });
     match ControlEstimate::of(waits.collect(), 0.0) {
         Some(wait) => {
-            let half_width = wait.half_width.max(0.1 * period);
+            let half_width = wait.half_width.max(0.1 * period).max(0.5 * track.log.accuracy.smoothing);
             let wait = ControlEstimate { value: wait.value.max(0.0), half_width, ..wait };
             found.push("control.wait_ms", wait, MILLISECOND, "ms");
         }
@@ -406,7 +425,10 @@ fn motion_time(track: &Track<'_>) -> f64 {
     let first = samples.find(moving);
     let last = samples.rfind(moving).or(first);
     match (first, last) {
-        (Some(first), Some(last)) => (last + 1 - first) as f64 * track.log.period,
+        // The first sample is at rest until the end of its window.
+        (Some(first), Some(last)) => {
+            (last + 2).saturating_sub(first + track.log.accuracy.window) as f64 * track.log.period
+        }
         _ => 0.0,
     }
 }
@@ -420,6 +442,8 @@ struct Axes<'a> {
     rapids: Vec<Vec<f64>>,
     moving: [bool; AXIS_COUNT],
     law: Option<RampLaw>,
+    /// Length of the shortest filter that the drives do not hide, s; 0 with setpoints.
+    shortest: f64,
 }
 
 impl<'a> Axes<'a> {
@@ -431,6 +455,7 @@ impl<'a> Axes<'a> {
             rapids: vec![Vec::new(); AXIS_COUNT],
             moving: [false; AXIS_COUNT],
             law: None,
+            shortest: (FILTER_SHARE * track.log.accuracy.drive_squares).sqrt(),
         };
         for (index, motion) in track.motions.iter().enumerate() {
             for axis in 0..AXIS_COUNT {
@@ -443,15 +468,17 @@ impl<'a> Axes<'a> {
             }
             let [Some(before), Some(after)] = track.rests(index) else { continue };
             let scale = (motion.to[axis] - motion.from[axis]).abs() / motion.length;
-            let places = track.places(index, before.saturating_sub(5)..(after + 6).min(log_end(track)));
+            let places = track.places(
+                index,
+                before.saturating_sub(5)..(after + 5 + track.log.accuracy.window).min(log_end(track)),
+            );
             let places: Vec<f64> = places.iter().map(|place| place * scale).collect();
-            let Some(constant) = plateau(&places, track.log.resolution) else { continue };
+            let Some(constant) = plateau(&places, track.log.accuracy) else { continue };
             let start = ramp(&places, &constant, track.log.period);
             let last = places.len() - 1;
             let length = motion.length * scale;
             let reversed: Vec<f64> = places.iter().rev().map(|place| length - place).collect();
-            let constant =
-                ramp::Plateau { ends: [last - constant.ends[1], last - constant.ends[0]], ..constant };
+            let constant = constant.reversed(last, length);
             let (Some(start), Some(end)) = (start, ramp(&reversed, &constant, track.log.period)) else {
                 continue;
             };
@@ -463,7 +490,7 @@ impl<'a> Axes<'a> {
             }
         }
         axes.drop_short();
-        axes.law = RampLaw::fit(&axes.ramps, track.log.period);
+        axes.law = RampLaw::fit(&axes.ramps, track.log.period, track.log.accuracy.drive_squares);
         axes
     }
 
@@ -543,7 +570,10 @@ impl<'a> Axes<'a> {
             Smoothing::None(time) => choose(
                 "control.jerk_limited",
                 "false",
-                format!("the acceleration is constant, smoothed over {:.1} ms at most", 1e3 * time),
+                format!(
+                    "the acceleration is constant, smoothed over {:.1} ms at most",
+                    1e3 * time.max(self.shortest)
+                ),
             ),
             Smoothing::Filters(_) => {
                 choose(

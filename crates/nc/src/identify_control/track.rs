@@ -1,6 +1,6 @@
 //! Motions of a program and the place of each sample of a log on them.
 
-use super::log::ControlLog;
+use super::log::{ControlLog, LogAccuracy};
 use crate::motion::{
     AXIS_COUNT, AXIS_LETTERS, Coordinates, Feed, MotionKind, PathControl, ProgramEvent, ProgramMotion,
     ProgramStep, is_rotary,
@@ -211,23 +211,25 @@ impl<'a> Track<'a> {
         let mut samples = vec![[0, 0]; motions.len()];
         samples[current][0] = sample;
         let mut place = 0.0;
-        let tolerance = 1e-9 + log.resolution;
+        let tolerance = 1e-9 + log.accuracy.resolution;
+        // Estimated setpoints can run back.
+        let slack = if log.accuracy.is_estimated() { 20.0 * log.accuracy.resolution } else { 0.0 };
         let mut worst = (0.0, 0, 0);
         while let Some(position) = log.positions.get(sample) {
-            let (mut at, mut away) = motions[current].nearest(position, place);
+            let (mut at, mut away) = motions[current].nearest(position, (place - slack).max(0.0));
             while let Some(next) = motions.get(current + 1) {
                 let (next_at, next_away) = next.nearest(position, 0.0);
-                let is_past = at >= motions[current].length - tolerance && next_at > tolerance;
-                if next_away + tolerance < away || (is_past && next_away <= away + tolerance) {
+                let is_past = at.max(place) >= motions[current].length - tolerance && next_at > tolerance;
+                if next_away + tolerance.max(slack) < away || (is_past && next_away <= away + tolerance) {
                     samples[current][1] = sample;
                     current += 1;
                     samples[current][0] = sample;
-                    (at, away) = (next_at, next_away);
+                    (at, away, place) = (next_at, next_away, next_at);
                 } else {
                     break;
                 }
             }
-            place = at;
+            place = at.max(place);
             let excess = away - 0.2 * motions[current].length;
             if excess > worst.0 {
                 worst = (excess, current, sample);
@@ -252,16 +254,21 @@ impl<'a> Track<'a> {
                 motions[current].line
             ));
         }
-        let at_rest = |pair: &[Coordinates]| distance(&pair[0], &pair[1]) <= 2.0 * log.resolution;
-        let is_at_rest = log.positions.windows(2).map(at_rest).chain([true]).collect();
+        let LogAccuracy { resolution, window, .. } = log.accuracy;
+        let at_rest = |samples: &[Coordinates]| {
+            samples.iter().all(|sample| distance(&samples[0], sample) <= 2.0 * resolution)
+        };
+        let ends = std::iter::repeat_n(true, window);
+        let is_at_rest =
+            log.positions.windows(window + 1).map(at_rest).chain(ends).take(log.positions.len()).collect();
         Ok(Self { log, motions, samples, is_at_rest })
     }
 
     /// Returns the samples from the last one at rest before a motion to the first one at rest behind it; `None` where the
     /// axes do not rest. A rest has at least two steps.
     pub fn rests(&self, motion: usize) -> [Option<usize>; 2] {
-        /// Samples between the rest and the motion.
-        const REACH: usize = 4;
+        // Samples between the rest and the motion.
+        let reach = 2 * (self.log.accuracy.window + 1);
         let [first, end] = self.samples[motion];
         let rests = |sample: usize| {
             sample >= 1
@@ -270,10 +277,10 @@ impl<'a> Track<'a> {
                 && self.is_at_rest[sample]
         };
         let near = |sample: usize, point: &Coordinates| {
-            distance(&self.log.positions[sample], point) <= 1e-7 + 4.0 * self.log.resolution
+            distance(&self.log.positions[sample], point) <= 1e-7 + 4.0 * self.log.accuracy.resolution
         };
         let TrackedMotion { from, to, .. } = &self.motions[motion];
-        let before = (first.saturating_sub(REACH)..=first + REACH)
+        let before = (first.saturating_sub(reach)..=first + reach)
             .filter(|&i| i >= 1 && i < end && rests(i - 1) && near(i, from))
             .max()
             .or((first == 0).then_some(0));
@@ -284,7 +291,7 @@ impl<'a> Track<'a> {
             sample
         });
         let start = before.unwrap_or(first);
-        let after = (start + 1..(end + REACH).min(self.is_at_rest.len())).find(|&i| {
+        let after = (start + 1..(end + reach).min(self.is_at_rest.len())).find(|&i| {
             near(i, to) && self.is_at_rest[i] && self.is_at_rest.get(i + 1).copied().unwrap_or(true)
         });
         [before, after]

@@ -46,6 +46,9 @@ pub struct IdentifyControlArguments {
     /// Write the machine with the identified profile to this file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// The log has positions of the encoders in place of setpoints, which are estimated with the drives of the machine.
+    #[arg(long)]
+    recorded_positions: bool,
     #[command(flatten)]
     log: LogArguments,
     #[command(flatten)]
@@ -73,7 +76,10 @@ pub fn run(arguments: &IdentifyControlArguments) -> Result<String, Box<dyn Error
     }
     // All errors of the program at once.
     program.survey(&config.without_trajectory_limits(), &mut |_| ())?;
-    let log = read_log(&input, &config)?;
+    let mut log = read_log(&input, &config)?;
+    if arguments.recorded_positions {
+        log = log.setpoints_of(&config).map_err(|error| format!("{}: {error}", arguments.setpoints))?;
+    }
     let options = arguments.part_program.options()?;
     let name = &arguments.program;
     let steps = Interpreter::new(
