@@ -10,6 +10,9 @@ use super::current_fit::{CurrentFit, PRIOR, RIPPLE_PRIOR, largest};
 use super::moving_data::{CurrentRipple, MovingData, RIPPLE, Sample, law_of};
 use crate::recording::{GaussianFilter, Signals};
 
+/// Factor of the variance of the noise by which the costs of the ways are compared if the phase of the samples is unknown: the
+/// simulated ripples then have errors of the model.
+const UNKNOWN_PHASE: f64 = 16.0;
 /// Passes of a comparison, whose prior depends on the inertia.
 const LINEAR_PASSES: usize = 3;
 
@@ -35,7 +38,7 @@ pub(super) struct CurrentLoggings {
     pub instants: Vec<LoggedInstant>,
     /// Relative standard error of the simulated ripple.
     pub error: f64,
-    /// True if the phase of the samples in the position cycles is known. Otherwise all ways remain as probable as before.
+    /// True if the phase of the samples in the position cycles is known. Otherwise differences of the costs count less.
     pub is_phase_known: bool,
 }
 
@@ -159,10 +162,10 @@ impl MovingData {
         }
         let least = compared.iter().map(|(_, _, cost)| *cost).fold(f64::INFINITY, f64::min);
         let of_instants: f64 = loggings.instants.iter().map(|instant| instant.prior).sum();
+        let variance = noise * noise * if loggings.is_phase_known { 1.0 } else { UNKNOWN_PHASE };
         let weight = |(way, _, cost): &(Option<usize>, DVector<f64>, f64)| {
             let prior = way.map_or(1.0 - of_instants, |k| loggings.instants[k].prior);
-            let excess = if loggings.is_phase_known { cost - least } else { 0.0 };
-            prior * (-0.5 * excess / (noise * noise)).exp()
+            prior * (-0.5 * (cost - least) / variance).exp()
         };
         let sum: f64 = compared.iter().map(weight).sum();
         let best = compared

@@ -1,5 +1,7 @@
 //! Least squares: weighted linear, and nonlinear within bounds (Levenberg–Marquardt).
 
+use std::sync::OnceLock;
+
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
 use rayon::prelude::*;
@@ -85,8 +87,8 @@ pub(super) fn minimize(
 ) -> Option<NonlinearFit> {
     let problem = search(parameters, effort, &residuals);
     let values = problem.values();
-    let at_end = residuals(&values)?;
-    let jacobian = problem.derivatives(&values)?;
+    let at_end = problem.here()?;
+    let jacobian = problem.derivatives()?;
     let freedom = at_end.len().saturating_sub(values.len()).max(1);
     let squares = at_end.norm_squared();
     let covariance = inverse(&(jacobian.transpose() * &jacobian))? * (squares / freedom as f64);
@@ -104,9 +106,8 @@ pub(super) fn descend(
     effort: Effort,
     residuals: impl Fn(&[f64]) -> Option<DVector<f64>> + Sync,
 ) -> Option<(Vec<f64>, f64)> {
-    let values = search(parameters, effort, &residuals).values();
-    let squares = residuals(&values)?.norm_squared();
-    Some((values, squares))
+    let problem = search(parameters, effort, &residuals);
+    Some((problem.values(), problem.here()?.norm_squared()))
 }
 
 fn search<'a, R: Fn(&[f64]) -> Option<DVector<f64>> + Sync>(
@@ -114,7 +115,7 @@ fn search<'a, R: Fn(&[f64]) -> Option<DVector<f64>> + Sync>(
     effort: Effort,
     residuals: &'a R,
 ) -> Problem<'a, R> {
-    let problem = Problem { z: start(parameters), parameters, effort, residuals };
+    let problem = Problem { z: start(parameters), here: OnceLock::new(), parameters, effort, residuals };
     let (problem, _) = LevenbergMarquardt::new()
         .with_tol(effort.tolerance())
         .with_patience(effort.max_evaluations_per_parameter())
@@ -133,6 +134,8 @@ fn start(parameters: &[BoundedParameter]) -> DVector<f64> {
 
 struct Problem<'a, R> {
     z: DVector<f64>,
+    /// Residuals at `z`, once they are known.
+    here: OnceLock<Option<DVector<f64>>>,
     parameters: &'a [BoundedParameter],
     effort: Effort,
     residuals: &'a R,
@@ -144,21 +147,27 @@ impl<R: Fn(&[f64]) -> Option<DVector<f64>> + Sync> Problem<'_, R> {
         self.parameters.iter().zip(self.z.iter()).map(value).collect()
     }
 
+    /// Returns the residuals of the values.
+    fn here(&self) -> Option<&DVector<f64>> {
+        self.here.get_or_init(|| (self.residuals)(&self.values())).as_ref()
+    }
+
     /// Returns the Jacobian of the residuals with respect to the values.
-    fn derivatives(&self, values: &[f64]) -> Option<DMatrix<f64>> {
+    fn derivatives(&self) -> Option<DMatrix<f64>> {
+        let values = self.values();
         let at = |k: usize, x: f64| {
-            let mut moved = values.to_vec();
+            let mut moved = values.clone();
             *moved.get_mut(k)? = x;
             (self.residuals)(&moved)
         };
         let here = match self.effort {
             Effort::Formula => None,
-            Effort::Simulation => Some((self.residuals)(values)?),
+            Effort::Simulation => Some(self.here()?),
         };
         let column = |k: usize| {
             let (p, x) = (self.parameters.get(k)?, *values.get(k)?);
             let (low, high) = ((x - p.step).max(p.low), (x + p.step).min(p.high));
-            match &here {
+            match here {
                 None => Some((at(k, high)? - at(k, low)?) / (high - low)),
                 Some(here) if high > x => Some((at(k, high)? - here) / (high - x)),
                 Some(here) => Some((here - at(k, low)?) / (x - low)),
@@ -176,7 +185,10 @@ impl<R: Fn(&[f64]) -> Option<DVector<f64>> + Sync> LeastSquaresProblem<f64, Dyn,
     type ParameterStorage = Owned<f64, Dyn>;
 
     fn set_params(&mut self, z: &DVector<f64>) {
-        self.z.copy_from(z);
+        if self.z != *z {
+            self.z.copy_from(z);
+            self.here = OnceLock::new();
+        }
     }
 
     fn params(&self) -> DVector<f64> {
@@ -184,11 +196,11 @@ impl<R: Fn(&[f64]) -> Option<DVector<f64>> + Sync> LeastSquaresProblem<f64, Dyn,
     }
 
     fn residuals(&self) -> Option<DVector<f64>> {
-        (self.residuals)(&self.values())
+        self.here().cloned()
     }
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
-        let mut jacobian = self.derivatives(&self.values())?;
+        let mut jacobian = self.derivatives()?;
         for ((mut column, p), z) in jacobian.column_iter_mut().zip(self.parameters).zip(self.z.iter()) {
             column *= (p.high - p.low) * 0.5 * z.cos();
         }

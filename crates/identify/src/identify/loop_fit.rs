@@ -167,7 +167,7 @@ impl LoopProblem<'_> {
         let bounded = self.bounded(periods, parameters, values);
         let noise = self.correlated_noise(axis, periods, parameters, values)?.max(f64::MIN_POSITIVE);
         let problem = LoopProblem { noise, ..*self };
-        let residuals = |x: &[f64]| problem.residuals(axis, periods, parameters, x);
+        let residuals = problem.residuals_of(axis, periods, parameters);
         let data = residuals(values)?.len().checked_sub(parameters.len())?;
         posterior_covariance(&bounded, values, residuals, &vec![None; data], noise)
     }

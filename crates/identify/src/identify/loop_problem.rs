@@ -2,6 +2,8 @@
 //!
 //! A shift of the commanded position makes α continuous.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use nalgebra::DVector;
 
 use super::closed_loop::position_residuals;
@@ -103,10 +105,34 @@ impl LoopProblem<'_> {
         parameters: &[LoopParameter],
         values: &[f64],
     ) -> Option<DVector<f64>> {
-        let (moved, shift) = apply(axis, periods, parameters, values);
-        let left = position_residuals(&moved, periods, &self.experiments(periods, shift))?;
-        let prior = prior(parameters, values, self.given_gain).into_iter().map(|row| self.noise * row);
-        Some(DVector::from_iterator(left.len() + prior.len(), left.iter().copied().chain(prior)))
+        self.residuals_of(axis, periods, parameters)(values)
+    }
+
+    /// Returns the residuals as a function of the values. It keeps the experiments of the last shift, which most of the values
+    /// of a Jacobian share.
+    pub fn residuals_of<'b>(
+        &'b self,
+        axis: &'b AxisConfig,
+        periods: &'b Periods,
+        parameters: &'b [LoopParameter],
+    ) -> impl Fn(&[f64]) -> Option<DVector<f64>> + Sync + 'b {
+        let last: Mutex<Option<(f64, Arc<Vec<Experiment>>)>> = Mutex::new(None);
+        let shifted = move |shift: f64| {
+            let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+            let known =
+                last.as_ref().filter(|(of, _)| *of == shift).map(|(_, experiments)| experiments.clone());
+            known.unwrap_or_else(|| {
+                let experiments = Arc::new(self.experiments(periods, shift));
+                *last = Some((shift, experiments.clone()));
+                experiments
+            })
+        };
+        move |values| {
+            let (moved, shift) = apply(axis, periods, parameters, values);
+            let left = position_residuals(&moved, periods, &shifted(shift))?;
+            let prior = prior(parameters, values, self.given_gain).into_iter().map(|row| self.noise * row);
+            Some(DVector::from_iterator(left.len() + prior.len(), left.iter().copied().chain(prior)))
+        }
     }
 
     pub fn bounded(

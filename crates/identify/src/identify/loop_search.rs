@@ -65,8 +65,9 @@ impl LoopProblem<'_> {
                 all.push(parameters.iter().map(value).collect::<Vec<f64>>());
             }
         }
+        let residuals = self.residuals_of(axis, periods, parameters);
         let tried = all.into_par_iter().filter_map(|values| {
-            let cost = self.residuals(axis, periods, parameters, &values)?.norm_squared();
+            let cost = residuals(&values)?.norm_squared();
             Some(LoopMinimum { values, cost })
         });
         let mut tried: Vec<LoopMinimum> = tried.collect();
@@ -83,9 +84,8 @@ impl LoopProblem<'_> {
         from: &[f64],
     ) -> Option<LoopMinimum> {
         let bounded = self.bounded(periods, parameters, from);
-        let (values, cost) = descend(&bounded, Effort::Simulation, |values| {
-            self.residuals(axis, periods, parameters, values)
-        })?;
+        let residuals = self.residuals_of(axis, periods, parameters);
+        let (values, cost) = descend(&bounded, Effort::Simulation, residuals)?;
         Some(LoopMinimum { values, cost })
     }
 

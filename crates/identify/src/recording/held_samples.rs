@@ -84,23 +84,26 @@ pub(super) fn with_stamps_of_renewals(
     if mean(&apart.collect::<Vec<f64>>())? > JITTER * period {
         return None;
     }
-    let shown = nominal.len().min(COMPARED);
-    let (before, count) = roughness(&nominal[..shown], position);
+    let shown = &nominal[..nominal.len().min(COMPARED)];
+    let (before, count) = roughness(shown.iter().copied(), position, f64::INFINITY)?;
+    if count < FEWEST {
+        return None;
+    }
+    let renewed =
+        |cycle: f64, phase: f64| move |time: &f64| ((time + phase) / cycle + 1e-6).floor() * cycle - phase;
     let cycles = (2..=LONGEST_CYCLE).map(|cycle| cycle as f64 * MILLISECOND).filter(|cycle| {
         let part = (period / cycle).fract();
         part.min(1.0 - part) > MOVED
     });
-    let renewed = |cycle: f64, phase: f64, count: usize| -> Vec<f64> {
-        let of = |time: &f64| ((time + phase) / cycle + 1e-6).floor() * cycle - phase;
-        nominal.iter().take(count).map(of).collect()
-    };
-    let tried = cycles.flat_map(|cycle| (0..PHASES).map(move |k| (cycle, k as f64 / PHASES as f64 * cycle)));
-    let tried =
-        tried.map(|(cycle, phase)| (cycle, phase, roughness(&renewed(cycle, phase, shown), position).0));
-    let (cycle, phase, least) = tried.min_by(|a, b| a.2.total_cmp(&b.2))?;
-    if count < FEWEST || least >= SMOOTHER * before {
-        return None;
+    let mut least = SMOOTHER * before;
+    let mut found = None;
+    for (cycle, k) in cycles.flat_map(|cycle| (0..PHASES).map(move |k| (cycle, k))) {
+        let phase = k as f64 / PHASES as f64 * cycle;
+        if let Some((sum, _)) = roughness(shown.iter().map(renewed(cycle, phase)), position, least) {
+            (least, found) = (sum, Some((cycle, phase)));
+        }
     }
+    let (cycle, phase) = found?;
     findings.push(Finding::note(
         "held-samples",
         format!(
@@ -111,22 +114,25 @@ pub(super) fn with_stamps_of_renewals(
             Rounded(period / MILLISECOND)
         ),
     ));
-    let stamps = renewed(cycle, phase, nominal.len());
+    let stamps: Vec<f64> = nominal.iter().map(renewed(cycle, phase)).collect();
     let kept: Vec<usize> = (0..stamps.len()).filter(|k| *k == 0 || stamps[*k] > stamps[k - 1]).collect();
     let time = kept.iter().map(|k| raw.time[0] + stamps[*k]).collect();
     Some((RawRecording { time, ..rows_of(raw, &kept) }, cycle))
 }
 
-/// Returns the sum of the distances of the position from a cubic through the four samples around each, and their number.
-/// Samples with one stamp count with their difference.
-fn roughness(stamps: &[f64], position: &[f64]) -> (f64, usize) {
+/// Returns the sum of the distances of the position from a cubic through the four samples around each, and their number; none if
+/// the sum is not below `limit`. Samples with one stamp count with their difference.
+fn roughness(stamps: impl Iterator<Item = f64>, position: &[f64], limit: f64) -> Option<(f64, usize)> {
     let mut sum = 0.0;
     let mut count = 0;
-    let mut distinct: Vec<(f64, f64)> = Vec::with_capacity(stamps.len());
-    for (time, value) in stamps.iter().zip(position).filter(|(_, value)| value.is_finite()) {
+    let mut distinct: Vec<(f64, f64)> = Vec::new();
+    for (time, value) in stamps.zip(position).filter(|(_, value)| value.is_finite()) {
         match distinct.last() {
-            Some((last, known)) if time <= last => sum += (value - known).abs(),
-            _ => distinct.push((*time, *value)),
+            Some((last, known)) if time <= *last => sum += (value - known).abs(),
+            _ => distinct.push((time, *value)),
+        }
+        if sum >= limit {
+            return None;
         }
     }
     for five in distinct.windows(5) {
@@ -145,8 +151,11 @@ fn roughness(stamps: &[f64], position: &[f64]) -> (f64, usize) {
             .sum();
         sum += (c.1 - cubic).abs();
         count += 1;
+        if sum >= limit {
+            return None;
+        }
     }
-    (sum, count)
+    (sum < limit).then_some((sum, count))
 }
 
 /// Returns the phase, among `count` samples, at which the position changes if it is held between them. A position that
