@@ -191,27 +191,43 @@ def test_recorded_positions_show_the_control(tmp_path: Path, probe: Path, seed: 
     assert max(map(abs, times)) < TIME, text
 
 
-def identified(folder: Path, machine: str, *settings: str) -> dict[str, float]:
-    """Returns the values identified from the setpoints of the profile `linuxcnc` for the probe program."""
+def identified(folder: Path, machine: str, *settings: str, recorded_axes: str = "") -> dict[str, float]:
+    """Returns the values identified from the setpoints of the profile `linuxcnc` for the probe program.
+
+    With `recorded_axes`, from the positions of these axes with 10 % more inertia than in the machine file.
+    """
     probe, log = folder / "probe.nc", folder / "log.csv"
     options = ["--machine", machine, *OFFSET]
     sets = ["periods.position_ms=1", "control.profile=linuxcnc", *settings]
     command("psec", "--probe", *options, "--out", probe)
     command("psec", probe, *options, *(word for text in sets for word in ("--set", text)), "--out", log)
+    if recorded_axes:
+        setpoints, log = log, folder / "trace.csv"
+        changes = ["periods.position_ms=1", *(f"{axis}.deviation.inertia=1.1" for axis in recorded_axes)]
+        given = [word for text in changes for word in ("--set", text)]
+        command("run", setpoints, "--machine", machine, *given, "--trace", log, "--quiet")
+        units = {axis: "rad" if axis in "abc" else "m" for axis in recorded_axes}
+        columns = (f"{axis}={axis}.position[{unit}]" for axis, unit in units.items())
+        options += ["--recorded-positions", *(word for text in columns for word in ("--column", text))]
     found = json.loads(command("identify-control", probe, log, *options, "--json"))
     return {value["parameter"]: value["value"] for value in found["values"]}
 
 
-def test_limits_of_rotary_axes_are_identified(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("recorded_axes", "tolerance"), [("", 1e-3), ("xyzac", 1e-2)])
+def test_limits_of_all_axes_are_identified(tmp_path: Path, recorded_axes: str, tolerance: float) -> None:
     truth = {
         "a.limits.velocity_rpm": 9.0,
         "a.limits.acceleration_rev_s2": 0.6,
         "c.limits.velocity_rpm": 16.0,
         "c.limits.acceleration_rev_s2": 0.7,
+        "x.limits.acceleration_m_s2": 2.5,
+        "y.limits.acceleration_m_s2": 3.0,
+        "z.limits.acceleration_m_s2": 2.1,
     }
-    found = identified(tmp_path, "mikron_ucp710", *(f"{key}={value}" for key, value in truth.items()))
+    settings = [f"{key}={value}" for key, value in truth.items()]
+    found = identified(tmp_path, "mikron_ucp710", *settings, recorded_axes=recorded_axes)
     for key, value in truth.items():
-        assert abs(found[key] / value - 1) < 1e-3, found
+        assert abs(found[key] / value - 1) < tolerance, found
 
 
 def test_gaps_of_short_lines_change_no_other_parameter(tmp_path: Path) -> None:

@@ -8,9 +8,11 @@ use std::sync::Arc;
 use virtual_axes_core::config::{AxisConfig, MachineConfig, Periods};
 use virtual_axes_core::design::{LearningFilter, LearningTuning};
 use virtual_axes_core::machine::{Machine, MachineParameters, closed_loop_response};
+use virtual_axes_core::statistics::rms;
 use virtual_axes_core::units::{Rounded, seconds};
 
 use super::log::{ControlLog, LogAccuracy};
+use super::track::weight;
 use crate::motion::AXIS_LETTERS;
 
 /// Number of iterations: with a gain of 1 each leaves a hundredth of the error.
@@ -22,8 +24,9 @@ const MOST_CHANGE: f64 = 2.0;
 /// Times before and behind a sample, s, and distance, m or rad, within which setpoints count as the end of a motion.
 const QUIET: [f64; 2] = [0.016, 0.06];
 const NEAR: f64 = 3e-5;
-/// Deviation of the estimated setpoints, m or rad.
+/// Smallest deviation of the estimated setpoints, m, and multiple of their RMS deviation at the ends of motions.
 const DEVIATION: f64 = 3e-6;
+const OF_RESTS: f64 = 3.0;
 /// Sum of squares that drives other than those of the machine leave in the ramps, s².
 const DRIVE_SQUARES: f64 = 2e-5;
 /// Time over which a speed is taken, s.
@@ -50,19 +53,21 @@ impl ControlLog {
                 Rounded(1e3 * seconds(periods.velocity))
             ));
         }
+        let mut deviation = DEVIATION.max(4.0 * self.accuracy.resolution);
         for (index, letter) in AXIS_LETTERS.iter().enumerate().filter(|(index, _)| self.has_axis[*index]) {
             let axis =
                 machine.axes().iter().find(|axis| axis.name().eq_ignore_ascii_case(&letter.to_string()));
             let Some(axis) = axis else { continue };
             let positions: Vec<f64> = self.positions.iter().map(|position| position[index]).collect();
-            let setpoints = learned(axis, periods, &positions)
+            let (setpoints, of_rests) = learned(axis, periods, &positions)
                 .map_err(|error| format!("axis {}: {error}", axis.name()))?;
             for (position, setpoint) in log.positions.iter_mut().zip(setpoints) {
                 position[index] = setpoint;
             }
+            deviation = deviation.max(OF_RESTS * weight(index) * of_rests);
         }
         log.accuracy = LogAccuracy {
-            resolution: DEVIATION.max(4.0 * self.accuracy.resolution),
+            resolution: deviation,
             window: ((WINDOW / self.period).ceil() as usize).max(2),
             smoothing: self.period,
             drive_squares: DRIVE_SQUARES,
@@ -71,11 +76,12 @@ impl ControlLog {
     }
 }
 
-/// Returns the setpoints of an axis for its positions, with the inertia that lets them rest after motions.
+/// Returns the setpoints of an axis for its positions, with the inertia that lets them rest after motions, and their RMS
+/// deviation there.
 ///
 /// The setpoints of a control end a motion in a finite time. Estimated with another inertia, they approach the end as slowly as
 /// the position loop.
-fn learned(axis: &AxisConfig, periods: Periods, positions: &[f64]) -> Result<Vec<f64>, String> {
+fn learned(axis: &AxisConfig, periods: Periods, positions: &[f64]) -> Result<(Vec<f64>, f64), String> {
     let with = |factor: f64| {
         let mut axis = axis.clone();
         axis.deviation.inertia *= factor;
@@ -83,20 +89,25 @@ fn learned(axis: &AxisConfig, periods: Periods, positions: &[f64]) -> Result<Vec
     };
     let [before, behind] = QUIET.map(|time| (time / seconds(periods.position)).ceil() as usize);
     let (nominal, moved) = (with(1.0)?, with(1.0 + INERTIA_STEP)?);
-    let [mut product, mut square] = [0.0; 2];
-    for k in before..nominal.len().saturating_sub(behind) {
+    let is_end = |k: &usize| {
         let rest = nominal[k + behind];
-        if nominal[k - before..k + behind].iter().all(|setpoint| (setpoint - rest).abs() < NEAR) {
-            let slope = moved[k] - moved[k + behind] - (nominal[k] - rest);
-            product += slope * (nominal[k] - rest);
-            square += slope * slope;
-        }
+        nominal[k - before..k + behind].iter().all(|setpoint| (setpoint - rest).abs() < NEAR)
+    };
+    let ends: Vec<usize> = (before..nominal.len().saturating_sub(behind)).filter(is_end).collect();
+    let away = |setpoints: &[f64], k: usize| setpoints[k] - setpoints[k + behind];
+    let [mut product, mut square] = [0.0; 2];
+    for &k in &ends {
+        let slope = away(&moved, k) - away(&nominal, k);
+        product += slope * away(&nominal, k);
+        square += slope * slope;
     }
     if square == 0.0 {
-        return Ok(nominal);
+        return Ok((nominal, 0.0));
     }
     let change = INERTIA_STEP * product / square;
-    with((1.0 - change).clamp(MOST_CHANGE.recip(), MOST_CHANGE))
+    let found = with((1.0 - change).clamp(MOST_CHANGE.recip(), MOST_CHANGE))?;
+    let deviation = rms(ends.iter().map(|&k| away(&found, k))).unwrap_or(0.0);
+    Ok((found, deviation))
 }
 
 /// Returns the setpoints with which a simulated axis moves along positions.
@@ -173,7 +184,7 @@ mod tests {
         let encoder = |position: f64| 1e-7 * (1e7 * position).round();
         let positions: Vec<f64> =
             simulated(&Arc::new(parameters), &expected).into_iter().map(encoder).collect();
-        let found = difference(&learned(axis, periods, &positions).unwrap(), &expected);
+        let found = difference(&learned(axis, periods, &positions).unwrap().0, &expected);
         let nominal = difference(&setpoints(axis, periods, &positions).unwrap(), &expected);
         assert!(found < 1e-6, "{found}");
         // The motion shows the inertia.

@@ -41,7 +41,8 @@ pub(super) struct TrackedArc {
     pub sweep: f64,
 }
 
-fn weight(axis: usize) -> f64 {
+/// Returns the length that counts for a unit of an axis.
+pub(super) fn weight(axis: usize) -> f64 {
     if is_rotary(axis) { ROTARY_LENGTH } else { 1.0 }
 }
 
