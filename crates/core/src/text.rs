@@ -65,9 +65,7 @@ pub fn nearest_name<T: AsRef<str>>(found: &str, known: impl IntoIterator<Item = 
     let found = shortened(found);
     let names = known.into_iter().map(|name| shortened(name.as_ref()));
     let similar = names.filter(|name| jaro_winkler(&found, name) >= MIN_SIMILARITY);
-    let distances = similar.map(|name| (damerau_levenshtein(&found, &name), name));
-    let close = distances.filter(|(distance, name)| 2 * distance <= found.len().max(name.len()));
-    close.min_by_key(|(distance, _)| *distance).map(|(_, name)| name)
+    similar.min_by_key(|name| damerau_levenshtein(&found, name))
 }
 
 /// Returns true if `found` differs from `name` in at most a third of its characters, or in one.
