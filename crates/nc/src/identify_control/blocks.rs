@@ -1,5 +1,8 @@
 //! Speed in rows of short lines, which the block cycle and the look-ahead limit.
 
+use virtual_axes_core::units::MILLISECOND;
+
+use super::ControlIdentification;
 use super::law::{ControlEstimate, RampLaw};
 use super::track::Track;
 
@@ -110,4 +113,29 @@ fn rows(track: &Track<'_>, law: &RampLaw) -> Vec<Row> {
         first = end;
     }
     rows
+}
+
+/// Identifies block cycle and look-ahead.
+pub(super) fn identify_blocks(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentification) {
+    let blocks = Blocks::of(track, law);
+    let Some([cycle, ahead]) = blocks.bounds else {
+        found.not_shown.push(
+            "block cycle and look-ahead: no row of short lines of one axis, of the same length, without a corner".to_owned(),
+        );
+        return;
+    };
+    match blocks.cycle {
+        Some(cycle) => found.push("control.block_cycle_ms", cycle, MILLISECOND, "ms"),
+        None => found.not_shown.push(format!(
+            "block cycle: at most {:.3} ms; it takes two rows of shorter lines that it limits",
+            1e3 * cycle
+        )),
+    }
+    match blocks.look_ahead {
+        Some(count) => found.push("control.look_ahead", count, 1.0, "blocks"),
+        None => found.not_shown.push(format!(
+            "look-ahead: at least {:.0} blocks; it takes rows of short lines at a higher feed that it limits",
+            ahead.floor()
+        )),
+    }
 }

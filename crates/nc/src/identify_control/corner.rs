@@ -19,7 +19,10 @@ const HALVINGS: usize = 40;
 const STEPS: usize = 300;
 const THIRDS: usize = 25;
 
-/// LineCorner of two lines with the same feed.
+/// Part of the feed below which a corner is a stop, and above which it does not slow down.
+pub(super) const CORNER_SPEEDS: [f64; 2] = [0.02, 0.97];
+
+/// Corner of two lines with the same feed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LineCorner {
     pub path_control: PathControl,
