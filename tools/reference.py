@@ -490,7 +490,8 @@ class Module:
     def find(self, name: str) -> tuple[Definition | ast.Assign, str, Module] | None:
         """Returns the definition of a name, the documentation of a constant, and its module; None for a native name."""
         for position, node in enumerate(self.tree.body):
-            if isinstance(node, Definition) and node.name == name:
+            is_overload = isinstance(node, ast.FunctionDef) and _is_decorated(node, "overload")
+            if isinstance(node, Definition) and node.name == name and not is_overload:
                 return node, "", self
             if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == name:
                 return node, _text_after(self.tree.body, position), self

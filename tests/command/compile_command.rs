@@ -134,6 +134,10 @@ M2
     for kept in ["G38.2 X-.1 F20.", "G0 X1. Z1.", "G0 X-1. Z0."] {
         assert!(better.lines().any(|line| line == kept), "{kept}\n{better}");
     }
+    // Increments of a control that resolves 0.0001 in add up as they are written.
+    let decimals =
+        better.split(|c: char| !c.is_ascii_digit() && c != '.').filter_map(|number| number.split_once('.'));
+    assert!(decimals.into_iter().all(|(_, digits)| digits.len() <= 4), "{better}");
     // Notes on inches and probing are on standard error.
     let output = run(&["run", &out, "--reference", &part, "--json"]);
     let found: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
@@ -173,6 +177,67 @@ fn a_tolerance_is_held_in_less_time_than_the_least_error_or_reported_as_not_held
     // With a higher feed it takes less time, within the tolerance.
     let report = json(&["compile", &part, "--tolerance-um", "500", "--feed-limit", "150", "--json"]);
     assert!(report["after"]["cycle_time_s"].as_f64() < report["before"]["cycle_time_s"].as_f64());
+}
+
+/// The touch point of a probe, the length of a tool, work offsets and optional lines are those of the machine.
+#[test]
+fn no_word_is_added_for_an_axis_whose_position_the_program_does_not_give() {
+    let folder = TestFolder::new("compile_unknown");
+    let text = "G21 G90 G17 G94 G64 P0.01
+G0 X-30 Y-30 Z0
+G4 P0.5
+G38.2 Z-5 F200
+G1 X-50 F3000
+Y-50
+/ X-60
+G1 X-40 Y-40
+Y-20
+G43 H1
+X-20
+G55
+G1 X-40 F2900
+Y-40
+X-20
+Y-20
+G41 D7 X-25
+Y-30
+G40 Y-40 X-30
+M2
+";
+    let part = folder.file("part.nc", text).to_string_lossy().into_owned();
+    let out = folder.path("better.nc");
+    run(&["compile", &part, "--same-time", "--more-time", "3", "--out", &out]);
+    let better = std::fs::read_to_string(&out).expect("the program");
+    assert_ne!(better, text);
+    let (_, after) = better.split_once("G38.2 Z-5 F200\n").expect("the probing move");
+    assert!(!after.contains('Z'), "{better}");
+    let optional = "/ X-60\nG1 X-40 Y-40\n";
+    let offset = "G55\nG1 X-40 F2900\nY-40\n";
+    let compensated = "G41 D7 X-25\nY-30\nG40 Y-40 X-30\nM2\n";
+    for unchanged in [optional, offset, compensated] {
+        assert!(after.contains(unchanged), "{better}");
+    }
+}
+
+#[test]
+fn arcs_get_points_beside_the_reversals_of_their_axes() {
+    let folder = TestFolder::new("compile_arcs");
+    let text = "G21 G90 G17 G94 G64
+G0 X-100 Y-100 Z-100
+G4 P0.5
+G1 F6000 X-50 Y-100
+G2 X-100 Y-50 I-50 J0 Z-105
+G3 X-150 Y-100 R50
+G2 I50 J0
+M2
+";
+    let part = folder.file("part.nc", text).to_string_lossy().into_owned();
+    let out = folder.path("better.nc");
+    let report = json(&["compile", &part, "--same-time", "--more-time", "3", "--out", &out, "--json"]);
+    let [before, after] = ["before", "after"].map(|when| figure(&report, when, "all_plants"));
+    assert!(after < 0.85 * before, "{before} to {after} µm");
+    let run = json(&["run", &out, "--reference", &part, "--json"]);
+    assert_eq!(max(&run), figure(&report, "after", "nominal"));
 }
 
 #[test]

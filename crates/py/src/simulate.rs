@@ -1,11 +1,12 @@
 //! Complete runs: setpoints in, signals and figures out.
 
+use std::ffi::CString;
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyReadonlyArray2};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use virtual_axes_builtin::PROGRAMS;
@@ -15,12 +16,14 @@ use virtual_axes_core::kinematics::Kinematics;
 use virtual_axes_core::machine::check_input;
 use virtual_axes_core::path::Program;
 use virtual_axes_core::trial::{
-    self, Measures, RunOptions, SetpointSource, Tick, Trial, TrialError, TrialOutcome,
+    self, Figures, Measures, RunOptions, SetpointSource, Tick, Trial, TrialError, TrialOutcome,
 };
 use virtual_axes_io::files::{figures_json, part_program_json, trace_writer};
 use virtual_axes_nc::offline::{LineErrors, ProgramFigures, ProgramTrack, line_texts};
 use virtual_axes_report::ToolPath;
-use virtual_axes_report::runs::{ProgramReport, SimulatedRun, SimulationPage, controller_name};
+use virtual_axes_report::runs::{
+    ProgramReport, SimulatedRun, SimulationPage, axis_warnings, controller_name,
+};
 
 use crate::convert::{check_signals, value_error};
 use crate::machine::PyMachine;
@@ -248,6 +251,7 @@ pub fn simulate<'py>(
     let mut prepared = psec.prepare(py, machine)?;
     let (outcome, part) =
         py.detach(|| run(machine, &mut prepared, (measures, options.every_tick), &loads, &mut recorded))?;
+    warn_of_loops(py, &machine.config, &outcome.figures)?;
     let mut json = figures_json(&outcome.figures);
     if let Some(part) = part {
         json.insert("part_program".to_owned(), part_program_json(&part));
@@ -259,6 +263,21 @@ pub fn simulate<'py>(
         None => PyDict::new(py),
     };
     Ok((recorded.signals.into_dict(py, machine.config.axes().len())?, tool, json, setpoints))
+}
+
+/// Warns of loops of moving axes without control or stability, as the command does.
+fn warn_of_loops(py: Python<'_>, config: &MachineConfig, figures: &Figures) -> PyResult<()> {
+    for (axis, _) in config.axes().iter().zip(&figures.axes).filter(|(_, figures)| figures.moves) {
+        for warning in axis_warnings::loops(axis, &config.periods()) {
+            PyErr::warn(
+                py,
+                &py.get_type::<PyUserWarning>(),
+                &CString::new(warning).map_err(value_error)?,
+                2,
+            )?;
+        }
+    }
+    Ok(())
 }
 
 /// Simulates setpoints again and writes the trace of `virtual_axes run --trace`, a row per position cycle.

@@ -76,11 +76,15 @@ pub(super) fn errors(runs: &[ReportRun]) -> Option<Section> {
         panel("Orientation error", DisplayUnit::MILLIDEGREE, if turns { orientation } else { Vec::new() }),
         panel("Feed", DisplayUnit::METER_PER_MINUTE, feeds),
     ];
+    let has_feed = panels.last().is_some_and(|feed| !feed.series.is_empty());
     let panels: Vec<Panel> = panels.into_iter().filter(|panel| !panel.series.is_empty()).collect();
     let mut section = Section::new("Errors of the tool");
     if !panels.is_empty() {
-        let note = "distance of the tool tip from the path; feed: speed of the tip".to_owned();
-        section.charts.push(Chart { note, ..over_time("Errors and feed", panels) });
+        let (title, note) = match has_feed {
+            true => ("Errors and feed", "distance of the tool tip from the path; feed: speed of the tip"),
+            false => ("Errors", "distance of the tool tip from the path"),
+        };
+        section.charts.push(Chart { note: note.to_owned(), ..over_time(title, panels) });
     }
     let mut circles = circles(runs);
     if circles.len() > MOST_CIRCLES {

@@ -28,6 +28,11 @@
   const digits = (value, unit) => value === null || value === undefined ? "–" : `${Number(value.toPrecision(4))} ${unit}`;
   const range = values => values.reduce(([low, high], v) => v === null ? [low, high] : [Math.min(low, v), Math.max(high, v)],
     [Infinity, -Infinity]);
+  // Cuts the text of a label before its unit, where the titles of panels stand above each other.
+  const cut = label => {
+    const [, text, unit = ""] = label.match(/^(.*?)( \([^()]*\))?$/s);
+    return (text.length > 20 ? text.slice(0, 19) + "…" : text) + unit;
+  };
   const isInside = (value, low, high) => low === null || low === undefined || (value >= low && value <= high);
   const isShown = run => run === null || run === undefined || !hidden.has(run);
 
@@ -38,7 +43,7 @@
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: color("area"),
       font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: color("muted") },
       legend: { orientation: "h", x: 0, y: 1, yanchor: "bottom", font: { color: color("ink") } },
-      modebar: { bgcolor: color("page"), color: color("zero"), activecolor: color("ink") },
+      modebar: { orientation: "v", bgcolor: color("page"), color: color("zero"), activecolor: color("ink") },
       hoverlabel: { bgcolor: color("page"), bordercolor: color("rule"), font: { color: color("ink") }, namelength: 40 },
     };
   }
@@ -69,6 +74,8 @@
         spikethickness: 1, spikecolor: color("zero"), spikedash: "solid", hoverformat: ".5~g" }),
     };
     if (isOverPath) Object.assign(layout.xaxis, { title: { text: "Path position (mm)" }, autorange: true, range: undefined });
+    // Time and path position have no zoom in common.
+    if (isOverPath) layout.uirevision = "path";
     const traces = [], names = new Set();
     const legend = (name, look = "") => {
       const key = name + look;
@@ -79,7 +86,8 @@
       const top = 1 - i * (PANEL + GAP) / plotted, bottom = panels.length > 1 ? top - PANEL / plotted : 0;
       const values = range(panel.series.flatMap(series => series.y));
       layout[`yaxis${id}`] = axis(panel.y, { domain: [Math.max(bottom, 0), top], hoverformat: ".4~g" }, values);
-      for (const series of panel.series) traces.push({ ...line(series, legend), x: at(series.run, series.x), yaxis: `y${id}` });
+      for (const series of panel.series) traces.push({ ...line(series, legend), x: at(series.run, series.x), yaxis: `y${id}`,
+        ...(panels.length > 1 && { hovertemplate: `${plain(cut(panel.y.label))} %{y:.4~g}` }) });
       if (panel.series.every(series => series.y.every(v => v === null)))
         layout.annotations.push({ text: "no values", showarrow: false, xref: "paper", yref: "paper", x: 0.5, y: (top + bottom) / 2 });
       for (const band of panel.bands) for (const [y0, y1] of band.ends)
@@ -111,7 +119,8 @@
   }
 
   function axis(data, more, values) {
-    const result = { title: { text: plain(data.label), standoff: 8, font: { size: data.label.length > 22 && more.domain?.[0] > 0 ? 10 : 12 } }, gridcolor: color("grid"), zerolinecolor: color("zero"),
+    const isStacked = more.domain?.[1] - more.domain?.[0] < 1, label = isStacked ? cut(data.label) : data.label;
+    const result = { title: { text: plain(label), standoff: 8, font: { size: label.length > 22 && isStacked ? 10 : 12 } }, gridcolor: color("grid"), zerolinecolor: color("zero"),
       linecolor: color("rule"), showline: true, mirror: true, ticks: "outside", tickcolor: color("rule"), automargin: true,
       exponentformat: data.log ? "none" : "power", type: data.log ? "log" : "linear", rangemode: data.zero ? "tozero" : "normal", ...more };
     if (data.from !== null) result.range = [data.from, data.to].map(end => data.log ? Math.log10(end) : end);
@@ -185,7 +194,7 @@
 
   function hoverText(one, i) {
     const number = one.lines[i], text = number ? `line ${number}: ${plain(space.data.texts[number] ?? "")}<br>` : "";
-    const feed = one.feed.length ? `<br>feed ${digits(one.feed[i], "m/min")}${one.rapid[i] ? ", rapid traverse" : ""}` : "";
+    const feed = one.feed.length ? `<br>feed ${digits(one.feed[i] && Number(one.feed[i].toFixed(4)), "m/min")}${one.rapid[i] ? ", rapid traverse" : ""}` : "";
     const title = space.data.runs.length > 1 ? `${plain(one.title)}<br>` : "";
     return `${title}${text}${digits(one.time[i], "s")}, contour error ${digits(one.error[i], "µm")}${feed}`;
   }
@@ -357,8 +366,18 @@
   function showIndex(run, index) {
     const one = space.data.runs.find(one => one.run === run);
     screen.cursor = { run, index, time: one.time[index] };
+    if (isRapid(one)(index)) showAll();
     redraw([space, ...overTime]);
+    // A zoom without the place ends.
+    const place = screen.overPath ? pathPosition(run, one.time[index]) : one.time[index];
+    const zoomed = overTime.find(({ plot, isDrawn }) => isDrawn && !isInside(place, ...plot.layout.xaxis.range));
+    if (zoomed) Plotly.relayout(zoomed.plot, { "xaxis.autorange": true });
     space.note.textContent = hoverText(one, index).replace(/<br>/g, ", ").replace(/&lt;/g, "<").replace(/&gt;/g, ">").replace(/&amp;/g, "&");
+  }
+
+  // Shows the whole path, as its button does.
+  function showAll() {
+    if (!space.isWhole) space.element.querySelector("button.whole")?.click();
   }
 
   // Text alternatives: the ranges of the values
@@ -405,13 +424,13 @@
       if (magnification > 1) bars.push(toolbar("Scale of the error", [1, magnification].map(factor => button(factor > 1 ? `error × ${factor}` : "true scale",
         () => { space.magnification = factor; draw(space); }, factor === space.magnification))));
       if (runs.some(one => one.rapid.includes(1))) bars.push(toolbar("Extent", [["cuts", false], ["all", true]].map(([name, isWhole]) =>
-        button(name, () => { space.isWhole = isWhole; draw(space); }, !isWhole))));
+        Object.assign(button(name, () => { space.isWhole = isWhole; draw(space); }, !isWhole), { className: isWhole ? "whole" : "" }))));
       space.note = Object.assign(document.createElement("p"), { className: "place", textContent: "" });
       space.note.setAttribute("aria-live", "polite");
       space.plot.before(...bars);
       space.plot.after(space.note);
       if (overTime.length) overTime[0].element.before(toolbar("Horizontal axis", [["over time", false], ["over path", true]].map(([name, overPath]) =>
-        button(name, () => { screen.overPath = overPath; redraw(overTime.map(one => (one.plot.layout.xaxis.autorange = true, one))); }, !overPath))));
+        button(name, () => { screen.overPath = overPath; redraw(overTime); }, !overPath))));
     }
     const runs = document.querySelector("fieldset.runs");
     if (runs && figures.length) {
@@ -424,6 +443,7 @@
     for (const place of document.querySelectorAll("button[data-time]")) place.addEventListener("click", () => {
       document.querySelectorAll("button[data-time]").forEach(other => other.setAttribute("aria-pressed", String(other === place)));
       show(Number(place.dataset.run), Number(place.dataset.time));
+      if (space && space.element.getBoundingClientRect().top < 0) space.element.scrollIntoView();
     });
   }
 

@@ -138,7 +138,8 @@ fn verified_model(
         for (index, (shift, node)) in trial.shifts.iter_mut().zip(&model.nodes).enumerate() {
             if !node.is_fixed {
                 let step = 1e-5 * (1.0 + (index % 3) as f64);
-                *shift = Vector3::new(step, -0.7 * step, if index % 2 == 0 { 0.0 } else { 0.4 * step });
+                let trial = Vector3::new(step, -0.7 * step, if index % 2 == 0 { 0.0 } else { 0.4 * step });
+                *shift = trial.component_mul(&node.free);
             }
         }
         trial.feeds.iter_mut().enumerate().for_each(|(i, feed)| *feed = [1.0, 0.5, 0.8][i % 3]);

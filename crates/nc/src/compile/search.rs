@@ -239,7 +239,7 @@ impl Search<'_> {
             let gain = gains[node];
             if !model.nodes[node].is_fixed {
                 let error = self.smoothed(&errors, index);
-                changes.shifts[node] -= error * gain;
+                changes.shifts[node] -= (error * gain).component_mul(&model.nodes[node].free);
                 changes.shifts[node] = changes.shifts[node].cap_magnitude(self.largest_shift);
             }
             let [error] = radial.value();

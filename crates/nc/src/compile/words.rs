@@ -5,7 +5,7 @@ use std::fmt::Write;
 /// Letters of words of a line whose points and feed are changed.
 const LETTERS: &str = "NGXYZABCUVWIJKRFP";
 /// G codes in tenths beside which a line is changed: motions at feed and modes.
-const CODES: [u32; 17] = [10, 20, 30, 170, 180, 190, 200, 210, 400, 610, 611, 640, 900, 910, 901, 911, 940];
+const CODES: [u32; 16] = [10, 20, 30, 170, 180, 190, 200, 210, 610, 611, 640, 900, 910, 901, 911, 940];
 
 /// Word of a line.
 #[derive(Debug, Clone, Copy)]
@@ -28,6 +28,27 @@ pub(super) struct WordLine {
 impl WordLine {
     /// Reads a line; `None` if it has anything but words of motions at feed with literal numbers and comments.
     pub fn read(text: &str) -> Option<Self> {
+        let line = Self::literal(text)?;
+        let is_repeated = |index: usize, word: &Word| {
+            word.letter != 'G' && line.words[..index].iter().any(|before| before.letter == word.letter)
+        };
+        let is_code = |word: &Word| {
+            word.letter != 'G'
+                || line.number(word).is_some_and(|code| CODES.contains(&((code * 10.0).round() as u32)))
+        };
+        let is_read = |(index, word): (usize, &Word)| {
+            LETTERS.contains(word.letter) && !is_repeated(index, word) && is_code(word)
+        };
+        (!line.words.is_empty() && line.words.iter().enumerate().all(is_read)).then_some(line)
+    }
+
+    /// Returns letters and numbers of a line; `None` if it has anything but words with literal numbers and comments.
+    pub fn literal_words(text: &str) -> Option<Vec<(char, f64)>> {
+        let line = Self::literal(text)?;
+        line.words.iter().map(|word| Some((word.letter, line.number(word)?))).collect()
+    }
+
+    fn literal(text: &str) -> Option<Self> {
         let bytes = text.as_bytes();
         let (mut words, mut at): (Vec<Word>, usize) = (Vec::new(), 0);
         while let Some(&byte) = bytes.get(at) {
@@ -35,25 +56,24 @@ impl WordLine {
                 b' ' | b'\t' => at += 1,
                 b';' => break,
                 b'(' => at += text[at..].find(')')? + 1,
-                _ => {
+                b'a'..=b'z' | b'A'..=b'Z' => {
                     let letter = char::from(byte.to_ascii_uppercase());
-                    let number =
-                        at + 1 + text.get(at + 1..)?.len() - text[at + 1..].trim_start_matches(' ').len();
+                    let number = at + 1 + text[at + 1..].len() - text[at + 1..].trim_start_matches(' ').len();
                     let length = text[number..].find(|c: char| !matches!(c, '0'..='9' | '.' | '+' | '-'));
                     let end = length.map_or(text.len(), |length| number + length);
-                    let value = text[number..end].parse::<f64>().ok()?;
-                    let is_repeated = letter != 'G' && words.iter().any(|word| word.letter == letter);
-                    let is_code = letter != 'G' || CODES.contains(&((value * 10.0).round().max(0.0) as u32));
-                    if !LETTERS.contains(letter) || is_repeated || !is_code {
-                        return None;
-                    }
+                    text[number..end].parse::<f64>().ok()?;
                     let decimals = text[number..end].split_once('.').map_or(0, |(_, digits)| digits.len());
                     words.push(Word { letter, start: at, number, end, decimals });
                     at = end;
                 }
+                _ => return None,
             }
         }
-        (!words.is_empty()).then(|| Self { text: text.to_owned(), words })
+        Some(Self { text: text.to_owned(), words })
+    }
+
+    fn number(&self, word: &Word) -> Option<f64> {
+        self.text[word.number..word.end].parse().ok()
     }
 
     /// Returns true for a line without words: blank, or a comment.
@@ -86,8 +106,7 @@ impl WordLine {
 
     /// Returns the number of a word.
     pub fn value(&self, letter: char) -> Option<f64> {
-        let word = self.words.iter().find(|word| word.letter == letter)?;
-        self.text[word.number..word.end].parse().ok()
+        self.number(self.words.iter().find(|word| word.letter == letter)?)
     }
 
     /// Returns the text with other numbers: words that the line has are replaced, the others follow the last word of an axis.

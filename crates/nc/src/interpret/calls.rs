@@ -7,6 +7,8 @@ use super::line_words::LineWords;
 use super::parameters::LOCALS;
 use super::state::{Jump, State};
 
+/// Variable of the first word I of a call.
+const FIRST_TRIPLE: usize = 4;
 /// Letters of the arguments of a macro, with the numbers of their variables.
 const ARGUMENTS: [(char, usize); 21] = [
     ('A', 1),
@@ -51,6 +53,7 @@ impl State {
         for (letter, number) in ARGUMENTS {
             arguments[number - 1] = block.take(letter).unwrap_or(f64::NAN);
         }
+        set_triples(&block.triples, &mut arguments)?;
         let call = Jump::Macro { program, times, arguments };
         match is_modal {
             true => self.modal_macro = Some((call, self.calls)),
@@ -97,4 +100,26 @@ impl State {
         });
         Ok(())
     }
+}
+
+/// Sets the variables #4 to #33 by the sets of words I, J and K of a call, if it has more than one.
+fn set_triples(triples: &[(char, f64)], arguments: &mut [f64; LOCALS]) -> Outcome<()> {
+    let (mut place, mut places) = (0, Vec::new());
+    for (letter, value) in triples {
+        let rank = usize::from(*letter as u8 - b'I');
+        while place % 3 != rank {
+            place += 1;
+        }
+        places.push((place + FIRST_TRIPLE, *value));
+        place += 1;
+    }
+    if places.last().is_none_or(|(place, _)| *place < FIRST_TRIPLE + 3) {
+        return Ok(());
+    }
+    for (number, value) in places {
+        let argument =
+            arguments.get_mut(number - 1).ok_or("a call has at most ten sets of words I, J and K")?;
+        *argument = value;
+    }
+    Ok(())
 }

@@ -145,6 +145,9 @@ impl State {
             }
             (3006, _) => self.push_event(ProgramEvent::Stop),
             (_, Some(Quantity::WorkOffset(system, axis))) => {
+                if let Some(given) = &mut self.options.given_work_offsets {
+                    given.insert(system);
+                }
                 self.options.work_offsets[system][axis] = known * self.unit(axis);
             }
             (_, Some(Quantity::ToolLength(tool))) => {
@@ -173,6 +176,8 @@ fn quantity(number: usize) -> Option<Quantity> {
         }
         7001..=7960 => offset(7001, WORK_OFFSET_COUNT),
         14001..=19980 => offset(14001, WORK_OFFSET_COUNT),
+        // Of Mazak.
+        70001..=75980 => offset(70001, WORK_OFFSET_COUNT),
         2001..=2200 => Some(Quantity::ToolLength(tool(2001))),
         2401..=2600 => Some(Quantity::ToolRadius(tool(2401))),
         11001..=11999 => Some(Quantity::ToolLength(tool(11001))),

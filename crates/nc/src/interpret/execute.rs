@@ -13,7 +13,7 @@ use super::cycles::is_canned;
 use super::dialect::Dialect;
 use super::error::Outcome;
 use super::line_words::{LineWords, Setting};
-use super::parameters::{FIRST_OF_CONTROL, FIRST_VARIABLE_OF_CONTROL};
+use super::parameters::{FIRST_OF_CONTROL, FIRST_VARIABLE_OF_CONTROL, integer};
 use super::state::{Modal, State};
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Blend, PathControl, Plane, ProgramEvent};
 
@@ -220,7 +220,9 @@ impl State {
                     self.assume("words P, Q and R of a tool change macro have no effect".to_owned());
                     block.skip("PQR");
                 }
-                self.modal.tool = self.modal.selected_tool;
+                // Of two words T, Mazak loads the first one and prepares the second.
+                let first = block.first_tool.and_then(integer).filter(|_| self.dialect.has_macro_b());
+                self.modal.tool = first.unwrap_or(self.modal.selected_tool);
                 self.push_event(ProgramEvent::ToolChange(self.modal.tool));
                 self.push_pause(self.options.tool_change_time);
             }

@@ -38,6 +38,10 @@ pub(super) struct LineWords {
     points: u32,
     /// True if letters are arguments of a macro: G65, G66.
     is_macro: bool,
+    /// Words I, J and K in their order.
+    pub triples: Vec<(char, f64)>,
+    /// First of two words T.
+    pub first_tool: Option<f64>,
     /// Letter of a word without effect, whose variable, the number, has no value.
     pub vacant: Option<(char, usize)>,
     /// Parameter settings, in their order.
@@ -57,7 +61,8 @@ impl LineWords {
     /// Reads a compact line.
     pub(super) fn read(&mut self, text: &[u8], state: &State) -> Outcome<()> {
         (self.given, self.unused, self.points, self.corner, self.is_macro) = (0, 0, 0, None, false);
-        (self.polar, self.vacant) = ([None; 2], None);
+        (self.polar, self.vacant, self.first_tool) = ([None; 2], None, None);
+        self.triples.clear();
         self.g.clear();
         self.m.clear();
         self.settings.clear();
@@ -78,7 +83,13 @@ impl LineWords {
                     scanner.value()?;
                 }
                 b',' if state.dialect.has_macro_b() => self.read_corner(&mut scanner)?,
-                // The rest after an optional stop within a line.
+                // An optional rest of the line, executed as optional lines are.
+                b'/' if state.dialect.has_macro_b() && !state.options.skips_optional_lines => {
+                    scanner.take();
+                    if scanner.peek().is_some_and(|switch| switch.is_ascii_digit()) {
+                        scanner.take();
+                    }
+                }
                 b'/' if state.dialect != Dialect::LinuxCnc => break,
                 _ => return Err(format!("{}: a word is required, a letter with a value", scanner.rest())),
             }
@@ -179,6 +190,13 @@ impl LineWords {
                 let bit = 1 << index(letter);
                 if self.unused & bit != 0 && matches!(state.dialect, Dialect::LinuxCnc | Dialect::Grbl) {
                     return Err(format!("two words {} in one line", char::from(letter.to_ascii_uppercase())));
+                }
+                if letter == b't' && self.unused & bit != 0 {
+                    self.first_tool = self.first_tool.or(Some(self.values[index(letter)]));
+                }
+                if matches!(letter, b'i' | b'j' | b'k') && state.dialect.has_macro_b() {
+                    require_count(self.triples.len(), "words I, J and K")?;
+                    self.triples.push((letter.to_ascii_uppercase().into(), value));
                 }
                 self.given |= bit;
                 self.unused |= bit;

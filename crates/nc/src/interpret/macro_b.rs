@@ -99,9 +99,12 @@ impl<R: BufRead + Seek> Interpreter<R> {
         let mut scanner = Scanner::new(&self.line.text, &self.state);
         scanner.skip("if");
         let is_true = is_true(scanner.bracket()?);
+        // The target of a jump that is not made can be a variable without value.
         if scanner.starts_with("goto") {
-            let number = jump_target(&mut scanner)?;
-            return if is_true { self.go_to(number) } else { Ok(()) };
+            return match is_true {
+                true => jump_target(&mut scanner).and_then(|number| self.go_to(number)),
+                false => Ok(()),
+            };
         }
         if !scanner.skip("then") && self.state.dialect != Dialect::Haas {
             return Err(format!("{}: IF requires GOTO or THEN", scanner.found()));

@@ -140,7 +140,13 @@ impl State {
     /// additional work offset).
     pub(super) fn set_data(&mut self, block: &mut LineWords) -> Outcome<()> {
         let is_macro_b = self.dialect.has_macro_b();
-        let level = block.take_integer('L')?.or(is_macro_b.then_some(2));
+        let level = match block.take_integer('L')? {
+            // One offset of older controls, for H and D.
+            None if is_macro_b && block.get('R').is_some() && !block.has_axis() => {
+                return self.set_tool_memory(block);
+            }
+            level => level.or(is_macro_b.then_some(2)),
+        };
         match level {
             // Loads the tool table again.
             Some(0) => return Ok(()),
@@ -212,12 +218,29 @@ impl State {
         Ok(())
     }
 
+    /// Sets the offset of the tool memory A of Fanuc, a length for H and a radius for D: G10 P R without L.
+    fn set_tool_memory(&mut self, block: &mut LineWords) -> Outcome<()> {
+        if self.dialect != Dialect::Fanuc {
+            return Err("G10 with R requires L10 to L13, for length or radius of the tool".to_owned());
+        }
+        let number = block.take_integer('P')?.ok_or("G10 with R requires P, the number of the offset")?;
+        let value = block.take('R').unwrap_or_default() * self.modal.length;
+        let is_incremental = self.modal.is_incremental;
+        let tool = self.options.tools.entry(number);
+        for part in [&mut tool.length, &mut tool.radius] {
+            *part = if is_incremental { *part + value } else { value };
+        }
+        Ok(())
+    }
+
     fn set_offset(&mut self, block: &mut LineWords, system: usize, level: u32) -> Outcome<()> {
         if let Some(given) = &mut self.options.given_work_offsets {
             given.insert(system);
         }
-        let is_incremental = self.modal.is_incremental && self.dialect.has_macro_b();
-        let rotation = block.take('R').filter(|_| level == 2);
+        let is_macro_b = self.dialect.has_macro_b();
+        let is_incremental = self.modal.is_incremental && is_macro_b;
+        // A rotation is a word of LinuxCNC.
+        let rotation = if is_macro_b { None } else { block.take('R').filter(|_| level == 2) };
         let words = self.take_axes(block)?;
         if words.iter().all(Option::is_none) && rotation.is_none() {
             return Err(format!("G10 L{level} requires at least one axis word"));
@@ -408,6 +431,9 @@ impl State {
                 self.modal.radius_number = number.or(self.modal.radius_number);
                 // LinuxCNC takes the tool in the spindle, other controls the last D.
                 let last = self.modal.radius_number.filter(|_| self.dialect != Dialect::LinuxCnc);
+                if self.dialect.has_macro_b() && last.is_none() {
+                    self.assume("G41 and G42 without D: the radius of the tool in the spindle".to_owned());
+                }
                 self.tool_radius(number.or(last).unwrap_or(self.modal.tool))
             }
         };

@@ -40,6 +40,9 @@ impl LineText {
         self.text.clear();
         self.message = None;
         self.is_optional = false;
+        if is_message(&self.raw) {
+            return Ok(());
+        }
         let mut rest = self.raw.iter().copied().enumerate();
         while let Some((index, byte)) = rest.next() {
             match byte {
@@ -58,6 +61,13 @@ impl LineText {
                         true => comment(&self.raw[index + 1..])?,
                         false => any_comment(&self.raw[index + 1..]),
                     };
+                    if is_statement(comment) {
+                        let text = decode(comment);
+                        return Err(format!(
+                            "({}): a statement of Fagor, whose controls are not supported",
+                            escaped(&text)
+                        ));
+                    }
                     self.message = message(comment).or(self.message.take());
                     rest.nth(comment.len());
                 }
@@ -184,6 +194,23 @@ fn message(comment: &[u8]) -> Option<String> {
     let comment = decode(comment);
     let (key, text) = comment.split_once(',')?;
     key.trim().eq_ignore_ascii_case("msg").then(|| escaped(text.trim()))
+}
+
+/// Returns true for a line `MSG "text"` of Estlcam and EdingCNC.
+fn is_message(line: &[u8]) -> bool {
+    let (key, text) = line.trim_ascii_start().split_at_checked(3).unwrap_or_default();
+    key.eq_ignore_ascii_case(b"msg") && text.trim_ascii_start().starts_with(b"\"")
+}
+
+/// Returns true for a comment that is a statement of Fagor: `RPT N10,N20`, `CALL 5`, `PCALL 6,P0=3`.
+fn is_statement(comment: &[u8]) -> bool {
+    let rest = ["RPT N", "CALL ", "PCALL "].into_iter().find_map(|word| {
+        let (start, rest) = comment.split_at_checked(word.len())?;
+        start.eq_ignore_ascii_case(word.as_bytes()).then_some(rest)
+    });
+    rest.is_some_and(|rest| {
+        !rest.is_empty() && rest.iter().all(|byte| byte.is_ascii_digit() || b"NP,=-. ".contains(byte))
+    })
 }
 
 /// Returns the character at a byte of the line, for a message.

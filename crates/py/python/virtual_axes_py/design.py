@@ -67,7 +67,7 @@ class Margins:
         return f"Margins({', '.join(f'{name}={value:.6g}' for name, value in vars(self).items())})"
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class FrequencyResponse:
     """Frequency response of a control loop, open and closed, as `virtual_axes bode --csv` writes it."""
 

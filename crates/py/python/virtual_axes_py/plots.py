@@ -77,11 +77,11 @@ def plot(run: Run, axes: Sequence[str] | None, ax: Iterable[Axes] | None) -> Fig
         for what, place in (("setpoint and position", 0), ("following error", 2))
     ]
     panels = _panels([*titles, "motor current, A"], ax)
-    for name in names:
+    for index, name in enumerate(names):
         place, (_, length, _, small) = 2 * kinds.index(units[name]), UNITS[units[name]]
         one = signals[name]
-        (line,) = panels[place].plot(run.time, one["position"] * length, label=f"{name} position")
-        color = line.get_color()
+        color = f"C{index}"
+        panels[place].plot(run.time, one["position"] * length, color=color, label=f"{name} position")
         panels[place].plot(run.time, one["psec"] * length, "--", color=color, label=f"{name} setpoint")
         panels[place + 1].plot(run.time, (one["psec"] - one["position"]) * small, color=color, label=name)
         panels[-1].plot(run.time, one["current"], color=color, label=name)
@@ -98,7 +98,9 @@ def plot_path(run: Run, plane: str | None, ax: Axes | None) -> Figure:
     """Draws the path of the tool tip, as `Run.plot_path` documents."""
     missing = [name for name in ("tool_path", "tool_setpoint", "contour_error") if name not in run.tool]
     if missing:
-        raise ValueError(f"signal {missing[0]!r} of the tool is not recorded; it needs figures 'all' or 'contour'")
+        raise ValueError(
+            f"signal {missing[0]!r} of the tool is not recorded; it needs figures 'all' or 'contour', and all signals"
+        )
     setpoint, path = run.tool_setpoint * 1e3, run.tool_path * 1e3
     if plane is None:
         longest = sorted(range(3), key=lambda index: (-round(float(np.ptp(setpoint[:, index])), 9), index))[:2]
@@ -130,7 +132,7 @@ def plot_polar(run: Run, ax: Axes | None) -> Figure:
     """Draws the circles of a run, as `Run.plot_polar` documents."""
     circles = [circle for circle in run.circles() if len(circle.angle)]
     if not circles:
-        raise ValueError("the motion has no circle at constant feed; scenario('ballbar') has two")
+        raise ValueError("the motion is no scenario with a circle at constant feed, as scenario('ballbar') is")
     if ax is not None and _axes(ax).name != "polar":
         raise ValueError(f"ax has the projection {ax.name!r}; it must be polar: plt.subplot(projection='polar')")
     panel: Any = _figure((7, 7)).add_subplot(projection="polar") if ax is None else ax

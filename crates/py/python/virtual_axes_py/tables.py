@@ -156,6 +156,10 @@ def axis_columns(machine: Machine, name: str, given: Any) -> dict[str, NDArray[n
     if found is None:
         return None
     axes = machine.axes
+    for title, values in given.items() if hasattr(given, "data_vars") else ():
+        units = str(values.attrs.get("units", ""))
+        if title in axes and units not in ("", "m", "rad"):
+            raise ValueError(f"{name} of {title} has the units {units!r}; positions are in m or rad: convert them")
     wrong = [title for title in found if title not in axes and title != TIME]
     if wrong:
         raise ValueError(f"{name}: {unknown('axis', wrong[0], axes)} (m or rad), and {TIME} (s)")

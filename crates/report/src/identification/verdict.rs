@@ -57,7 +57,9 @@ fn table(page: &IdentificationPage) -> Option<Table> {
         ("R² of the current", ""),
     ];
     let row = |(name, is_unseen, residuals, baseline): (String, bool, &ResidualSummary, &BaselineSummary)| {
-        let r_squared = residuals.inverse_dynamics.as_ref().map(|inverse| inverse.current_r_squared);
+        let simulated = residuals.parts.iter().filter_map(|part| part.current_r_squared).reduce(f64::min);
+        let inverse = || residuals.inverse_dynamics.as_ref().map(|inverse| inverse.current_r_squared);
+        let r_squared = simulated.or_else(inverse);
         vec![
             name,
             if is_unseen { "validation" } else { "identification" }.to_owned(),

@@ -5,13 +5,13 @@ use virtual_axes_core::units::MILLIMETER;
 
 use super::super::words::{WordLine, number, rounded};
 use super::program_model::{Changes, CutPiece, CutShape, LEAST_SWEEP, ProgramModel, steps};
-use crate::interpret::InterpreterOptions;
+use crate::interpret::{InterpreterOptions, LineModes};
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates, Feed, PlanarArc, is_rotary};
 
 /// Words of the center of an arc by its axis.
 const CENTERS: [char; 3] = ['I', 'J', 'K'];
-/// Largest difference of an end of a motion from the planned one after rounding, m, and rad.
-const ROUNDING: f64 = 4e-7;
+/// Largest difference of an end of a motion from the planned one beside the rounding of its words, m, and in all, rad.
+const ROUNDING: f64 = 3.5e-7;
 const ROTARY_ROUNDING: f64 = 1e-6;
 
 /// Text of a changed program.
@@ -84,7 +84,7 @@ impl ProgramModel {
     ) -> Vec<(char, String)> {
         let CutPiece { motion, from, to, shape, .. } = self.pieces[piece];
         let modes = &self.motions[motion].1;
-        let least = if modes.unit == MILLIMETER { 4 } else { 5 };
+        let least = least_decimals(modes);
         let start = *carried;
         let mut numbers = Vec::new();
         for (axis, letter) in AXIS_LETTERS.into_iter().enumerate() {
@@ -115,8 +115,11 @@ impl ProgramModel {
         if let Some(radius) = words.value('R') {
             let end = &self.nodes[to];
             let at = [first, second].map(|axis| end.at[axis] + changes.shifts[to][axis]);
-            let new = (at[0] - center[0]).hypot(at[1] - center[1]) / modes.unit * radius.signum();
-            if changes.radii[piece] != 0.0 || changes.shifts[from] != changes.shifts[to] {
+            let is_part = self.by_line[&self.pieces[piece].line].len() > 1;
+            // Parts are shorter than half a turn.
+            let sign = if is_part { 1.0 } else { radius.signum() };
+            let new = (at[0] - center[0]).hypot(at[1] - center[1]) / modes.unit * sign;
+            if is_part || changes.radii[piece] != 0.0 || changes.shifts[from] != changes.shifts[to] {
                 numbers.push(('R', number(new, words.decimals('R').max(least))));
             }
             return numbers;
@@ -129,7 +132,8 @@ impl ProgramModel {
             let base = if modes.has_absolute_centers { 0.0 } else { start[axis] };
             let value = (programmed - base) / modes.unit;
             let tolerance = 0.5 * 0.1_f64.powi(decimals as i32);
-            if (value - words.value(letter).unwrap_or(0.0)).abs() > tolerance {
+            let given = words.value(letter).filter(|_| is_first).unwrap_or(0.0);
+            if (value - given).abs() > tolerance {
                 numbers.push((letter, number(value, decimals)));
             }
         }
@@ -169,15 +173,17 @@ impl ProgramModel {
         let (motions, events) = steps(&changed.text, name, options).map_err(|_| 0_usize)?;
         let mut found = motions.iter();
         let mut last = 0;
-        for (motion, _) in &self.motions {
+        for (index, (motion, _)) in self.motions.iter().enumerate() {
             let ends: Vec<(Coordinates, Option<usize>)> = match self.by_line.get(&motion.line) {
                 Some(range) => range.clone().map(|piece| (self.end(piece, changes), Some(piece))).collect(),
                 None => vec![(motion.end, None)],
             };
             for (end, piece) in ends {
                 let Some((new, _)) = found.next() else { return Err(last) };
+                let modes = &self.motions[index].1;
+                let rounding = ROUNDING + 0.5 * 0.1_f64.powi(least_decimals(modes) as i32) * modes.unit;
                 let is_near = end.iter().zip(&new.end).enumerate().all(|(axis, (wanted, end))| {
-                    let rounding = if is_rotary(axis) { ROTARY_ROUNDING } else { ROUNDING };
+                    let rounding = if is_rotary(axis) { ROTARY_ROUNDING } else { rounding };
                     (wanted - end).abs() < rounding
                 });
                 let is_same = std::mem::discriminant(&motion.kind) == std::mem::discriminant(&new.kind)
@@ -203,6 +209,13 @@ impl ProgramModel {
         let shift = changes.shifts[to];
         std::array::from_fn(|axis| self.nodes[to].at[axis] + if axis < 3 { shift[axis] } else { 0.0 })
     }
+}
+
+/// Returns the least number of decimals of words: increments have no more than a control resolves, since it would add up their
+/// rounding.
+fn least_decimals(modes: &LineModes) -> usize {
+    let of_millimeters = if modes.is_incremental { 3 } else { 4 };
+    if modes.unit == MILLIMETER { of_millimeters } else { of_millimeters + 1 }
 }
 
 /// Returns the center of the circle through three points; `None` on a line.
