@@ -115,11 +115,8 @@ impl ProgramModel {
         if let Some(radius) = words.value('R') {
             let end = &self.nodes[to];
             let at = [first, second].map(|axis| end.at[axis] + changes.shifts[to][axis]);
-            let is_part = self.by_line[&self.pieces[piece].line].len() > 1;
-            // Parts are shorter than half a turn.
-            let sign = if is_part { 1.0 } else { radius.signum() };
-            let new = (at[0] - center[0]).hypot(at[1] - center[1]) / modes.unit * sign;
-            if is_part || changes.radii[piece] != 0.0 || changes.shifts[from] != changes.shifts[to] {
+            let new = (at[0] - center[0]).hypot(at[1] - center[1]) / modes.unit * radius.signum();
+            if changes.radii[piece] != 0.0 || changes.shifts[from] != changes.shifts[to] {
                 numbers.push(('R', number(new, words.decimals('R').max(least))));
             }
             return numbers;
@@ -132,8 +129,7 @@ impl ProgramModel {
             let base = if modes.has_absolute_centers { 0.0 } else { start[axis] };
             let value = (programmed - base) / modes.unit;
             let tolerance = 0.5 * 0.1_f64.powi(decimals as i32);
-            let given = words.value(letter).filter(|_| is_first).unwrap_or(0.0);
-            if (value - given).abs() > tolerance {
+            if (value - words.value(letter).unwrap_or(0.0)).abs() > tolerance {
                 numbers.push((letter, number(value, decimals)));
             }
         }

@@ -1,7 +1,7 @@
 //! Points and feeds of a program that can be changed.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::TAU;
 use std::io::Cursor;
 
 use nalgebra::{Matrix3, Vector3};
@@ -31,8 +31,6 @@ const SAME: f64 = 1e-8;
 /// Sweep of a whole turn, and the least one of an arc whose radius is corrected, rad.
 const WHOLE_TURN: f64 = TAU - 1e-6;
 pub(super) const LEAST_SWEEP: f64 = 0.2;
-/// Part of a quarter of a turn within which an end of an arc is a reversal.
-const SAME_QUARTER: f64 = 1e-3;
 /// Distance of the sweep from half a turn within which an arc by R is not changed, rad.
 const HALF_TURN_MARGIN: f64 = 0.2;
 
@@ -96,10 +94,10 @@ pub(in super::super) struct Changes {
     pub feeds: Vec<f64>,
 }
 
-/// Points that are added to lines and arcs of a program.
+/// Points that are added to the lines of a program.
 #[derive(Clone, Copy)]
 pub(in super::super) struct ExtraPoints<'a> {
-    /// Distances from corners, and from the reversals of an axis on arcs, m.
+    /// Distances from corners, m.
     pub distances: &'a [f64],
     /// Place of a point on a line on which rotary axes turn, as a part of its length.
     pub middles: &'a BTreeMap<usize, f64>,
@@ -183,15 +181,15 @@ impl ProgramModel {
                 _ if count.get(&motion.line) != Some(&1) => "executed more than once, or several motions",
                 (MotionKind::Nurbs(_) | MotionKind::Rapid, _) => "spline",
                 _ if !modes.is_plain
-                    || self.starts[motion.line - 1].is_compensated
+                    || self.start_of(motion.line).is_compensated
                     || !matches!(motion.feed, Feed::Linear(_)) =>
                 {
                     "cycle, probing, compensation, rotation, scaling or feed that is not per minute"
                 }
                 (_, None) => "words that are no literal numbers, or other codes",
                 (MotionKind::Arc(arc), Some(words)) if words.has('R') && half(arc) => "half turn by R",
-                (_, Some(words)) if !self.is_start_known(motion, modes, &words) => {
-                    "start that depends on an offset, a reference, a probe, an optional line or a jump"
+                (MotionKind::Arc(_), Some(words)) if !self.is_start_known(motion, modes, &words) => {
+                    "arc whose start depends on an offset, a reference, a probe, an optional line or a jump"
                 }
                 _ if left_out.contains(&motion.line) => "position used elsewhere in the program",
                 (_, Some(words)) => {
@@ -208,9 +206,14 @@ impl ProgramModel {
             .collect()
     }
 
+    /// Returns what is known at the start of a line, from 1; nothing for a line of another file.
+    fn start_of(&self, line: usize) -> LineStart {
+        self.starts.get(line.wrapping_sub(1)).copied().unwrap_or_default()
+    }
+
     /// Returns true if a line begins at a position that the program has given for all axes that it moves.
     fn is_start_known(&self, motion: &ProgramMotion, modes: &LineModes, words: &WordLine) -> bool {
-        let known = self.starts[motion.line - 1].known;
+        let known = self.start_of(motion.line).known;
         let is_in_plane = |axis: usize| match &motion.kind {
             MotionKind::Arc(arc) => arc.plane.axes()[..2].contains(&axis),
             _ => false,
@@ -251,7 +254,8 @@ impl ProgramModel {
             at,
             is_fixed: is_fixed || !is_shifted,
             free: Vector3::from_fn(|axis, _| {
-                f64::from(u8::from(modes.is_incremental || self.starts[motion.line - 1].known[axis]))
+                let is_known = modes.is_incremental || self.start_of(motion.line).known[axis];
+                f64::from(u8::from(is_known || self.words[&motion.line].has(AXIS_LETTERS[axis])))
             }),
         };
         let (motion, modes) = &self.motions[chain.start];
@@ -266,41 +270,34 @@ impl ProgramModel {
                 _ => CutShape::Line,
             };
             let mut places = vec![1.0];
-            let is_blended = is_shifted && matches!(motion.path_control, PathControl::Blend(_));
-            match shape {
-                CutShape::Arc(arc) if is_blended && !self.words[&motion.line].has('P') => {
-                    places.extend(reversals(motion, &arc, extra.distances));
-                }
+            let is_split = is_shifted
+                && matches!((shape, motion.path_control), (CutShape::Line, PathControl::Blend(_)))
+                && self.is_start_known(motion, modes, &self.words[&motion.line]);
+            if is_split && turns(motion) {
                 // A control that overlaps motions of rotary axes is slower with more of them.
-                CutShape::Line if is_blended && turns(motion) => {
-                    places.extend(extra.middles.get(&motion.line))
+                places.extend(extra.middles.get(&motion.line));
+                places.sort_by(f64::total_cmp);
+            } else if is_split {
+                let length = (direction(motion, true).1).norm();
+                let near: Vec<f64> = extra
+                    .distances
+                    .iter()
+                    .map(|distance| distance / length)
+                    .filter(|part| *part < SPLIT_PART)
+                    .collect();
+                if index == chain.start || self.is_corner(index) {
+                    places.extend(&near);
                 }
-                CutShape::Line if is_blended => {
-                    let near = near(extra.distances, direction(motion, true).1.norm());
-                    if index == chain.start || self.is_corner(index) {
-                        places.extend(&near);
-                    }
-                    if is_last || self.is_corner(index + 1) {
-                        places.extend(near.iter().map(|part| 1.0 - part));
-                    }
+                if is_last || self.is_corner(index + 1) {
+                    places.extend(near.iter().map(|part| 1.0 - part));
                 }
-                _ => {}
+                places.sort_by(f64::total_cmp);
             }
-            places.sort_by(f64::total_cmp);
-            let mut before = 0.0;
             for place in places {
                 let at = std::array::from_fn(|axis| match place < 1.0 {
                     true => motion.start[axis] + place * (motion.end[axis] - motion.start[axis]),
                     false => motion.end[axis],
                 });
-                let (at, shape) = match shape {
-                    CutShape::Arc(arc) => {
-                        let part = PlanarArc { sweep: (place - before) * arc.sweep, ..arc };
-                        (if place < 1.0 { on_arc(motion, &arc, place, at) } else { at }, CutShape::Arc(part))
-                    }
-                    CutShape::Line => (at, shape),
-                };
-                before = place;
                 let to = self.nodes.len();
                 self.nodes.push(node(at, motion, modes, is_last && place == 1.0));
                 self.pieces.push(CutPiece { motion: index, line: motion.line, from: to - 1, to, shape });
@@ -438,43 +435,6 @@ impl ProgramModel {
 /// Returns true if a rotary axis turns.
 fn turns(motion: &ProgramMotion) -> bool {
     (0..AXIS_COUNT).any(|axis| is_rotary(axis) && motion.start[axis] != motion.end[axis])
-}
-
-/// Returns the distances from an end of a line or a part of an arc, as parts of its length, m, where it is long enough.
-fn near(distances: &[f64], length: f64) -> Vec<f64> {
-    distances.iter().map(|distance| distance / length).filter(|part| *part < SPLIT_PART).collect()
-}
-
-/// Returns points before and behind the places of an arc at which an axis reverses, and beside its ends, as parts of its
-/// sweep.
-fn reversals(motion: &ProgramMotion, arc: &PlanarArc, distances: &[f64]) -> Vec<f64> {
-    let [first, second, _] = arc.plane.axes();
-    let (x, y) = (motion.start[first] - arc.center[0], motion.start[second] - arc.center[1]);
-    let quarters = arc.sweep.abs() / FRAC_PI_2;
-    // Quarters of a turn from the start, against the sense of the arc, to the reversal before it.
-    let behind = (y.atan2(x) * arc.sweep.signum() / FRAC_PI_2 + SAME_QUARTER).rem_euclid(1.0) - SAME_QUARTER;
-    let mut ends = vec![0.0];
-    ends.extend((1..).map(|count| f64::from(count) - behind).take_while(|at| *at < quarters - SAME_QUARTER));
-    ends.push(quarters);
-    let mut places = Vec::new();
-    for pair in ends.windows(2) {
-        let length = (pair[1] - pair[0]) * FRAC_PI_2 * x.hypot(y);
-        for part in near(distances, length) {
-            let step = part * (pair[1] - pair[0]);
-            places.extend([(pair[0] + step) / quarters, (pair[1] - step) / quarters]);
-        }
-    }
-    places
-}
-
-/// Returns the point of an arc at a part of its sweep; `chord` is that of the chord.
-fn on_arc(motion: &ProgramMotion, arc: &PlanarArc, place: f64, mut chord: Coordinates) -> Coordinates {
-    let [first, second, _] = arc.plane.axes();
-    let radius = [motion.start[first] - arc.center[0], motion.start[second] - arc.center[1]];
-    let (sin, cos) = (place * arc.sweep).sin_cos();
-    chord[first] = arc.center[0] + cos * radius[0] - sin * radius[1];
-    chord[second] = arc.center[1] + sin * radius[0] + cos * radius[1];
-    chord
 }
 
 /// Returns the unit vector along the path at an end of a motion, and the chord of the motion, m.
