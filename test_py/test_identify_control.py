@@ -9,6 +9,7 @@ import os
 import random
 import statistics
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -235,6 +236,26 @@ def test_gaps_of_short_lines_change_no_other_parameter(tmp_path: Path) -> None:
     assert base.keys() == found.keys()
     for key, value in base.items():
         assert abs(found[key] / value - 1) < 1e-3, key
+
+
+def test_control_outside_the_profile_is_reported(tmp_path: Path, probe: Path) -> None:
+    control = Control.drawn(2013)
+    assert control.jerk is not None
+    for filters, is_outside in (([], False), ([0.03], True)):
+        log = tmp_path / "log.csv"
+        write(log, replace(control, filters=filters), probe.read_text())
+        found = json.loads(command("identify-control", probe, log, "--machine", "vmc", *OFFSET, "--json"))
+        assert any("outside the profile" in text for text in found["warnings"]) == is_outside, found
+
+
+def test_log_without_parameters_is_unusable(tmp_path: Path) -> None:
+    program, log, out = (tmp_path / name for name in ("line.nc", "log.csv", "mine.yaml"))
+    program.write_text("G21 G90 G94 G17 G61\nG0 X10 Y10\nG1 X40 Y30 F600\nM2\n")
+    command("psec", program, "--machine", "vmc", *OFFSET, "--out", log)
+    words = ["identify-control", program, log, "--machine", "vmc", *OFFSET, "--out", out]
+    run = subprocess.run([COMMAND, *words], capture_output=True, text=True, timeout=120, check=False)
+    assert (run.returncode, out.exists()) == (1, False), run
+    assert "no parameter is identified: acceleration of X: no straight motion" in run.stderr, run.stderr
 
 
 def main(first: int, end: int, *, recorded: bool) -> None:

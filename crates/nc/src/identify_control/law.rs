@@ -56,6 +56,13 @@ impl ControlEstimate {
         let half_width = (COVERAGE * (square / count as f64).sqrt()).max(relative * value.abs());
         Some(Self { value, half_width, count })
     }
+
+    /// Adds the relative half widths of the limits by which it is divided; a limit of which a bound is known has none.
+    pub fn divided_by(self, limits: &[Self]) -> Self {
+        let of = |limit: &Self| limit.half_width / limit.value;
+        let relative = limits.iter().map(of).filter(|part| part.is_finite()).fold(0.0, f64::max);
+        Self { half_width: self.half_width.hypot(relative * self.value), ..self }
+    }
 }
 
 /// Shape of the ramps.
@@ -216,9 +223,8 @@ impl RampLaw {
         };
         let Some(fit) = filtered else {
             for &axis in &axes {
-                let values =
-                    ramps[axis].iter().map(|ramp| ramp.speed / ramp.squares.max(f64::MIN_POSITIVE).sqrt());
-                law.accelerations[axis] = ControlEstimate::of(values.collect(), 0.05);
+                let value = |ramp: &SpeedRamp| ramp.speed / ramp.squares.max(f64::MIN_POSITIVE).sqrt();
+                law.accelerations[axis] = ControlEstimate::of(ramps[axis].iter().map(value).collect(), 0.05);
             }
             return Some(law);
         };
@@ -268,8 +274,8 @@ impl RampLaw {
                 return Some(law);
             }
         }
-        let deviation = COVERAGE * fit.covariance[(unknowns - 1, unknowns - 1)].max(0.0).sqrt();
-        let deviation = deviation.hypot(drive_squares);
+        let variance = fit.covariance[(unknowns - 1, unknowns - 1)].max(0.0);
+        let deviation = (COVERAGE * variance.sqrt()).hypot(drive_squares);
         law.smoothing = Smoothing::Filters(stages(ramps, &law.accelerations, [squares, deviation], period));
         Some(law)
     }
@@ -362,8 +368,7 @@ fn stages(
     let ratio = f64::midpoint(low, high);
     let [first, second] = split(ratio);
     let count = ramps.iter().map(Vec::len).sum();
-    let of =
-        |value: f64, spread: f64| ControlEstimate { value, half_width: spread.max(0.05 * period), count };
+    let of = |value: f64, width: f64| ControlEstimate { value, half_width: width.max(0.05 * period), count };
     let of_sum = |value: f64| 0.5 * deviation * value / squares;
     let least = residual(ratio);
     if shown.is_empty() || ratio < LEAST_STAGE || second < period || least > TWO_STAGES * residual(0.0) {

@@ -14,7 +14,7 @@ const WHOLE: f64 = 0.015;
 
 /// Identifies the acceleration of motions before a standstill in G64, and beside corners in G61.
 pub(super) fn identify_ends(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentification) {
-    let [mut overlaps, mut kinks] = [Vec::new(), Vec::new()];
+    let (mut overlaps, mut kinks, mut divisors) = (Vec::new(), Vec::new(), Vec::new());
     let period = track.log.period;
     for (index, motion) in track.motions.iter().enumerate() {
         let Some(axis) = motion.single_axis().filter(|_| motion.feed.is_finite()) else { continue };
@@ -41,8 +41,11 @@ pub(super) fn identify_ends(track: &Track<'_>, law: &RampLaw, found: &mut Contro
         };
         let parts = if is_blended { &mut overlaps } else { &mut kinks };
         parts.extend(acceleration.map(|a| a / limit.value));
+        divisors.push(limit);
     }
-    match ControlEstimate::of(overlaps, 2e-3) {
+    let estimate =
+        |parts: Vec<f64>| ControlEstimate::of(parts, 2e-3).map(|estimate| estimate.divided_by(&divisors));
+    match estimate(overlaps) {
         Some(part) if part.value > 1.0 - WHOLE => {
             found.push("control.overlap_fraction", ControlEstimate { value: 1.0, ..part }, 1.0, "");
         }
@@ -52,7 +55,7 @@ pub(super) fn identify_ends(track: &Track<'_>, law: &RampLaw, found: &mut Contro
                 .to_owned(),
         ),
     }
-    match ControlEstimate::of(kinks, 2e-3) {
+    match estimate(kinks) {
         Some(part) if part.value > 1.0 - WHOLE => {
             found.push("control.kink_fraction", ControlEstimate { value: 1e-3, ..part }, 1.0, "");
         }
