@@ -26,13 +26,14 @@ pub(super) fn identify_circles(track: &Track<'_>, law: &RampLaw, found: &mut Con
             normals.push(speed * speed / (arc.radius * limit));
         }
         let Some(ramp) = ramp(&places, &constant, period) else { continue };
-        let acceleration = law.acceleration(&ramp, &arc.plane);
-        tangentials.extend(acceleration.map(|[a, share]| [a / limit, share]));
+        let Some([acceleration, share]) = law.acceleration(&ramp, &arc.plane) else { continue };
+        tangentials.push((acceleration / limit, share, ramp.square(share, track.log.accuracy.drive_squares)));
     }
     found.values.retain(|value| value.key != "control.normal_fraction" || normals.is_empty());
-    let estimate =
-        |parts: Vec<f64>| ControlEstimate::of(parts, 2e-3).map(|estimate| estimate.divided_by(&divisors));
-    match estimate(normals) {
+    let estimate = |parts: Vec<f64>, divisors: &[ControlEstimate]| {
+        ControlEstimate::of(parts, 2e-3).map(|estimate| estimate.divided_by(divisors))
+    };
+    match estimate(normals, &divisors) {
         Some(e) => found.push("control.normal_fraction", ControlEstimate { value: e.value.min(1.0), ..e }, 1.0, ""),
         None => found.not_shown.push(
             "acceleration across the path on arcs: no arc from rest that limits the feed; it takes a higher feed or smaller \
@@ -41,10 +42,10 @@ pub(super) fn identify_circles(track: &Track<'_>, law: &RampLaw, found: &mut Con
         ),
     }
     // The circles that show it best.
-    let best = tangentials.iter().map(|[_, share]| *share).fold(0.0, f64::max);
-    tangentials.retain(|[_, share]| *share >= SHOWN * best);
-    let tangentials = tangentials.iter().map(|[part, _]| *part).collect();
-    match estimate(tangentials) {
+    let best = tangentials.iter().map(|(_, share, _)| *share).fold(0.0, f64::max);
+    tangentials.retain(|(_, share, _)| *share >= SHOWN * best);
+    divisors.extend(tangentials.iter().map(|(.., ramp)| *ramp));
+    match estimate(tangentials.iter().map(|(part, ..)| *part).collect(), &divisors) {
         Some(e) => found.push(
             "control.tangential_fraction",
             ControlEstimate { value: e.value.min(1.0), ..e },

@@ -26,8 +26,6 @@ pub(super) const FILTER_SHARE: f64 = 2.0;
 const BETTER: f64 = 0.25;
 /// Relative difference of the squares of equal ramps.
 const SAME_RAMP: f64 = 0.01;
-/// Smallest share by which a ramp with a jerk limit shows its acceleration.
-const LEAST_ROOT: f64 = 0.02;
 /// Part of the squares of a ramp that filters leave to its acceleration.
 const LEAST_SHARE: f64 = 0.1;
 /// Jerk limits from which a search starts, as multiples of the acceleration over the time of a filter.
@@ -124,16 +122,6 @@ fn jerk_squares(speed: f64, acceleration: f64, jerk: f64) -> f64 {
     } else {
         2.0 * speed / jerk
     }
-}
-
-/// Returns the acceleration of a ramp with a known jerk limit, and how well the ramp shows it, 0 to 1; `None` if the ramp does
-/// not reach its acceleration.
-fn jerk_limited_acceleration(ramp: &SpeedRamp, jerk: f64) -> Option<[f64; 2]> {
-    // (v/a)² + (a/j)² is smallest, 2 v/j, where the acceleration is just reached.
-    let half = 0.5 * ramp.squares * jerk * jerk;
-    let root = half * half - (ramp.speed * jerk).powi(2);
-    let share = root / (half * half);
-    (share > LEAST_ROOT).then(|| [(half - root.sqrt()).sqrt(), share])
 }
 
 /// Fits acceleration and jerk of one axis; the values are their logarithms.
@@ -238,7 +226,8 @@ impl RampLaw {
             let half_width = (0.5 * value * deviation / slope).max(1e-4 * value);
             law.accelerations[axis] = Some(ControlEstimate { value, half_width, count: ramps[axis].len() });
         }
-        if squares < (INTERPOLATION * period).powi(2).max(FILTER_SHARE * drive_squares) {
+        let shortest = (INTERPOLATION * period).powi(2).max(FILTER_SHARE * drive_squares);
+        if squares < shortest {
             return Some(law);
         }
         let jerks: Option<Vec<Fit>> = axes
@@ -274,8 +263,12 @@ impl RampLaw {
                 return Some(law);
             }
         }
-        let variance = fit.covariance[(unknowns - 1, unknowns - 1)].max(0.0);
-        let deviation = (COVERAGE * variance.sqrt()).hypot(drive_squares);
+        let deviation = COVERAGE * fit.covariance[(unknowns - 1, unknowns - 1)].max(0.0).sqrt();
+        if squares - deviation < shortest {
+            law.is_ambiguous = false;
+            return Some(law);
+        }
+        let deviation = deviation.hypot(drive_squares);
         law.smoothing = Smoothing::Filters(stages(ramps, &law.accelerations, [squares, deviation], period));
         Some(law)
     }
@@ -286,7 +279,7 @@ impl RampLaw {
         match &self.smoothing {
             Smoothing::Jerk(jerks) => {
                 let least = axes.iter().try_fold(f64::INFINITY, |j, &axis| Some(j.min(jerks[axis]?.value)));
-                jerk_limited_acceleration(ramp, least?)
+                ramp.jerk_limited_acceleration(least?)
             }
             _ => {
                 let square = ramp.squares - self.filter_squares();

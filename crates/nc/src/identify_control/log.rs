@@ -8,8 +8,9 @@ use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates};
 
 /// Parts of the distance of a stamp from the grid by which the grid follows, one for each pass.
 const GAINS: [f64; 3] = [0.3, 0.1, 0.03];
-/// Largest distance of a stamp from the grid, and smallest one that is reported, sampling periods.
-const MOST_JITTER: f64 = 0.6;
+/// Distance of a stamp from the grid below which it fits, and above which it is reported, sampling periods. A missing sample
+/// that is not counted leaves at least half a period.
+const MOST_JITTER: f64 = 0.49;
 const REPORTED_JITTER: f64 = 0.01;
 /// Largest shift of a sample by rounding of the period to a decimal, sampling periods.
 const MOST_ROUNDING: f64 = 0.02;
@@ -70,17 +71,18 @@ impl ControlLog {
         });
         let axes: Vec<Option<usize>> = axes.collect();
         let times: Vec<f64> = rows.iter().map(|(time, _)| time - rows[0].0).collect();
-        let TimeGrid { mut period, slots, jitter } = TimeGrid::new(&times)?;
+        let grid = TimeGrid::new(&times)?;
+        let mut period = grid.decimal_period();
         let mut notes = Vec::new();
-        if jitter > REPORTED_JITTER {
+        if grid.jitter > REPORTED_JITTER {
             notes.push(format!(
                 "the time stamps are up to {} ms off an even grid: the samples are moved to it, one each {} ms",
-                Rounded(1e3 * jitter * period),
+                Rounded(1e3 * grid.jitter * period),
                 Rounded(1e3 * period)
             ));
         }
         let mut samples: Vec<(i64, &[f64])> =
-            slots.into_iter().zip(rows.iter().map(|(_, positions)| positions.as_slice())).collect();
+            grid.slots.iter().zip(rows).map(|(slot, (_, row))| (*slot as i64, row.as_slice())).collect();
         if let Some((length, first)) = runs(&samples) {
             samples.retain(|(slot, _)| (slot - first) % length == 0);
             samples.iter_mut().for_each(|(slot, _)| *slot = (*slot - first) / length);
@@ -123,10 +125,12 @@ impl ControlLog {
 /// Even grid of times, on which a control samples.
 #[derive(Debug, PartialEq)]
 struct TimeGrid {
+    /// Time of slot 0, s.
+    start: f64,
     /// Sampling period, s.
     period: f64,
-    /// Index of each sample on the grid.
-    slots: Vec<i64>,
+    /// Slot of each sample, a whole number.
+    slots: Vec<f64>,
     /// Largest distance of a stamp from the grid, sampling periods.
     jitter: f64,
 }
@@ -141,11 +145,14 @@ impl TimeGrid {
         if steps.iter().any(|step| *step <= 0.0) {
             return Err("the times of the rows do not increase".to_owned());
         }
-        // Without missing samples the mean, with long gaps the median.
+        let all = Self::through(times, (0..times.len()).map(|k| k as f64).collect());
+        if all.jitter < MOST_JITTER {
+            return Ok(all);
+        }
         let mean = times[times.len() - 1] / steps.len() as f64;
-        let grids = [mean, middle].map(|period| Self::fit(times, period));
+        let grids = [mean, middle].map(|period| Self::following(times, period));
         let off = grids[1].jitter * grids[1].period;
-        grids.into_iter().find(|grid| grid.jitter <= MOST_JITTER).ok_or_else(|| {
+        grids.into_iter().find(|grid| grid.jitter < MOST_JITTER).ok_or_else(|| {
             format!(
                 "the time stamps do not fit an even grid: they are up to {} ms off one of {} ms; a control samples at a \
                  constant rate: write the stamps with more digits, or delete their column and give the rate by --rate-hz",
@@ -155,41 +162,53 @@ impl TimeGrid {
         })
     }
 
-    /// Fits the grid by least squares, from an estimate of its period.
-    fn fit(times: &[f64], mut period: f64) -> Self {
-        let count = times.len() as f64;
-        let center = times.iter().sum::<f64>() / count;
-        let mut start = times[0];
-        let mut slots = vec![0.0; times.len()];
+    /// Returns the grid of stamps with missing samples, from an estimate of its period.
+    fn following(times: &[f64], period: f64) -> Self {
+        let mut grid = Self { start: times[0], period, slots: Vec::new(), jitter: 0.0 };
         for gain in GAINS {
-            let mut phase = start;
-            for (slot, time) in slots.iter_mut().zip(times) {
-                *slot = ((time - phase) / period).round();
-                phase += gain * (time - phase - *slot * period);
-            }
-            // Two samples in one slot: the first one is late.
+            let mut phase = grid.start;
+            let slot = |time: &f64| {
+                let slot = ((time - phase) / grid.period).round();
+                phase += gain * (time - phase - slot * grid.period);
+                slot
+            };
+            let mut slots: Vec<f64> = times.iter().map(slot).collect();
+            // Two samples in one slot: the second one is late.
             for i in (1..slots.len()).rev() {
                 slots[i - 1] = slots[i - 1].min(slots[i] - 1.0);
             }
-            let middle = slots.iter().sum::<f64>() / count;
-            let [mut product, mut square] = [0.0; 2];
-            for (slot, time) in slots.iter().zip(times) {
-                product += (slot - middle) * (time - center);
-                square += (slot - middle).powi(2);
-            }
-            period = product / square;
-            start = center - middle * period;
+            grid = Self::through(times, slots);
         }
-        let length = slots[slots.len() - 1] - slots[0];
-        let decimals = (3..=9).map(|digits| {
-            let scale = 10_f64.powi(digits);
-            (period * scale).round() / scale
-        });
-        let is_same = |round: &f64| *round > 0.0 && (round - period).abs() * length <= MOST_ROUNDING * period;
+        grid
+    }
+
+    /// Fits the grid to stamps in slots by least squares.
+    fn through(times: &[f64], slots: Vec<f64>) -> Self {
+        let count = times.len() as f64;
+        let [center, middle] = [times, &slots].map(|values| values.iter().sum::<f64>() / count);
+        let [mut product, mut square] = [0.0; 2];
+        for (slot, time) in slots.iter().zip(times) {
+            product += (slot - middle) * (time - center);
+            square += (slot - middle).powi(2);
+        }
+        let period = product / square;
+        let start = center - middle * period;
         let distances = times.iter().zip(&slots).map(|(time, slot)| ((time - start) / period - slot).abs());
         let jitter = distances.fold(0.0, f64::max);
-        let period = decimals.into_iter().find(is_same).unwrap_or(period);
-        Self { period, slots: slots.iter().map(|slot| (slot - slots[0]) as i64).collect(), jitter }
+        Self { start, period, slots, jitter }
+    }
+
+    /// Returns the shortest decimal period that moves no sample.
+    fn decimal_period(&self) -> f64 {
+        let length = self.slots[self.slots.len() - 1] - self.slots[0];
+        let decimals = (3..=9).map(|digits| {
+            let scale = 10_f64.powi(digits);
+            (self.period * scale).round() / scale
+        });
+        let is_same = |period: &f64| {
+            *period > 0.0 && (period - self.period).abs() * length <= MOST_ROUNDING * self.period
+        };
+        decimals.into_iter().find(is_same).unwrap_or(self.period)
     }
 }
 

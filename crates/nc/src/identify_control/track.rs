@@ -266,8 +266,9 @@ impl<'a> Track<'a> {
         let left = motions.len() - 1 - current;
         if left > 0 {
             return Err(format!(
-                "the log ends on line {}; {left} motions of the program are left",
-                motions[current].line
+                "the log ends on line {}; {left} motions of the program are left: {}it ends early or starts late",
+                motions[current].line,
+                wrong_unit(log, &motions)
             ));
         }
         let LogAccuracy { resolution, window, .. } = log.accuracy;

@@ -140,7 +140,8 @@ fn read_log(input: &CommandInput, machine: &MachineConfig) -> Result<ControlLog,
     };
     let joints = source.joints().to_vec();
     let mut row = vec![0.0; joints.len()];
-    let mut rows = Vec::new();
+    let mut rows: Vec<(f64, Vec<f64>)> = Vec::new();
+    let mut line = 0;
     // Programs omit zeros at the end of numbers.
     let mut resolution = f64::INFINITY;
     loop {
@@ -153,6 +154,10 @@ fn read_log(input: &CommandInput, machine: &MachineConfig) -> Result<ControlLog,
         };
         for row in new {
             resolution = row.resolutions.iter().copied().fold(resolution, f64::min);
+            // The start positions, which the reader adds before a first row behind time 0, are no sample.
+            if std::mem::replace(&mut line, row.line) == row.line {
+                rows.clear();
+            }
             rows.push((seconds(row.time), row.positions));
         }
         if !has_row {
