@@ -250,12 +250,12 @@ def test_control_outside_the_profile_is_reported(tmp_path: Path, probe: Path) ->
 
 def test_log_without_parameters_is_unusable(tmp_path: Path) -> None:
     program, log, out = (tmp_path / name for name in ("line.nc", "log.csv", "mine.yaml"))
-    program.write_text("G21 G90 G94 G17 G61\nG0 X10 Y10\nG1 X40 Y30 F600\nM2\n")
+    program.write_text("G21 G90 G94 G17 G61\nG0 X-90 Y-90\nG1 X-60 Y-70 F600\nM2\n")
     command("psec", program, "--machine", "vmc", *OFFSET, "--out", log)
     words = ["identify-control", program, log, "--machine", "vmc", *OFFSET, "--out", out]
     run = subprocess.run([COMMAND, *words], capture_output=True, text=True, timeout=120, check=False)
     assert (run.returncode, out.exists()) == (1, False), run
-    assert "no parameter is identified: acceleration of X: no straight motion" in run.stderr, run.stderr
+    assert "nothing in the log fits; the first cause: acceleration of X: no straight motion" in run.stderr, run.stderr
 
 
 def main(first: int, end: int, *, recorded: bool) -> None:

@@ -111,7 +111,10 @@ pub fn run(arguments: &IdentifyControlArguments) -> Result<String, Box<dyn Error
     }
     if found.values.is_empty() {
         let cause = found.not_shown.first().map_or("the program has no motion", String::as_str);
-        let reason = format!("{}: no parameter is identified: {cause}", arguments.setpoints);
+        let reason = format!(
+            "{}: no parameter is identified, since nothing in the log fits; the first cause: {cause}",
+            arguments.setpoints
+        );
         return Err(Box::new(UnusableResult { text, reason, status: NO_PARAMETER }));
     }
     if let Some(out) = &arguments.out {
