@@ -231,6 +231,23 @@ def test_limits_of_all_axes_are_identified(tmp_path: Path, recorded_axes: str, t
         assert abs(found[key] / value - 1) < tolerance, found
 
 
+def test_intervals_contain_what_other_drives_change(tmp_path: Path) -> None:
+    probe, log, trace = (tmp_path / name for name in ("probe.nc", "log.csv", "trace.csv"))
+    command("psec", "--probe", "--machine", "vmc", "--out", probe)
+    sets = ["--set", "periods.position_ms=1"]
+    command("psec", probe, "--machine", "vmc", *sets, "--set", "control.profile=linuxcnc", "--out", log)
+    for axis, factor in (("x", 0.8), ("y", 0.8), ("z", 1.2)):
+        sets += ["--set", f"{axis}.deviation.torque_constant={factor}"]
+    command("run", log, "--machine", "vmc", *sets, "--trace", trace, "--quiet")
+    columns = [word for axis in "xyz" for word in ("--column", f"{axis}={axis}.position[m]")]
+    words = ["identify-control", probe, trace, "--machine", "vmc", "--recorded-positions", *columns, "--json"]
+    found = {value["parameter"]: value for value in json.loads(command(*words))["values"]}
+    truth = {"x.limits.acceleration_m_s2": 4, "control.normal_fraction": 0.866, "control.kink_fraction": 0.1}
+    truth |= {"control.overlap_fraction": 0.5, "control.wait_ms": 25}
+    for key, value in truth.items():
+        assert abs(found[key]["value"] - value) < found[key]["half_width"], found[key]
+
+
 def test_gaps_of_short_lines_change_no_other_parameter(tmp_path: Path) -> None:
     base, found = (identified(tmp_path, "vmc", f"control.gap_cycles={cycles}") for cycles in (0, 40))
     assert base.keys() == found.keys()

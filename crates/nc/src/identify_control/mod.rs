@@ -288,6 +288,22 @@ mod tests {
     }
 
     #[test]
+    fn values_with_absurd_intervals_are_not_identified() {
+        let cases = [
+            ("x.limits.acceleration_m_s2", 4.0, 0.1, true),
+            ("x.limits.acceleration_m_s2", 4.0, 1.5e151, false),
+            ("x.limits.acceleration_m_s2", 4.0, f64::NAN, false),
+            ("control.kink_fraction", 1e-3, 2e-3, true),
+            ("control.wait_ms", 0.0, 0.1, true),
+            ("control.wait_ms", 0.0, f64::INFINITY, false),
+        ];
+        for (key, value, half_width, expected) in cases {
+            let value = ControlValue { key: key.to_owned(), value, half_width, unit: "", count: 1 };
+            assert_eq!(value.is_identified(), expected, "{value:?}");
+        }
+    }
+
+    #[test]
     fn errors_name_stamps_and_unit() {
         let probe = Probe::new();
         let even = |k: usize| 1e-3 * k as f64;
