@@ -9,6 +9,7 @@ import os
 import random
 import statistics
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -230,11 +231,48 @@ def test_limits_of_all_axes_are_identified(tmp_path: Path, recorded_axes: str, t
         assert abs(found[key] / value - 1) < tolerance, found
 
 
+def test_intervals_contain_what_other_drives_change(tmp_path: Path) -> None:
+    probe, log, trace = (tmp_path / name for name in ("probe.nc", "log.csv", "trace.csv"))
+    command("psec", "--probe", "--machine", "vmc", "--out", probe)
+    sets = ["--set", "periods.position_ms=1"]
+    command("psec", probe, "--machine", "vmc", *sets, "--set", "control.profile=linuxcnc", "--out", log)
+    for axis, factor in (("x", 0.8), ("y", 0.8), ("z", 1.2)):
+        sets += ["--set", f"{axis}.deviation.torque_constant={factor}"]
+    command("run", log, "--machine", "vmc", *sets, "--trace", trace, "--quiet")
+    columns = [word for axis in "xyz" for word in ("--column", f"{axis}={axis}.position[m]")]
+    words = ["identify-control", probe, trace, "--machine", "vmc", "--recorded-positions", *columns, "--json"]
+    found = {value["parameter"]: value for value in json.loads(command(*words))["values"]}
+    truth = {"x.limits.acceleration_m_s2": 4, "control.normal_fraction": 0.866, "control.kink_fraction": 0.1}
+    truth |= {"control.overlap_fraction": 0.5, "control.wait_ms": 25}
+    for key, value in truth.items():
+        assert abs(found[key]["value"] - value) < found[key]["half_width"], found[key]
+
+
 def test_gaps_of_short_lines_change_no_other_parameter(tmp_path: Path) -> None:
     base, found = (identified(tmp_path, "vmc", f"control.gap_cycles={cycles}") for cycles in (0, 40))
     assert base.keys() == found.keys()
     for key, value in base.items():
         assert abs(found[key] / value - 1) < 1e-3, key
+
+
+def test_control_outside_the_profile_is_reported(tmp_path: Path, probe: Path) -> None:
+    control = Control.drawn(2013)
+    assert control.jerk is not None
+    for filters, is_outside in (([], False), ([0.03], True)):
+        log = tmp_path / "log.csv"
+        write(log, replace(control, filters=filters), probe.read_text())
+        found = json.loads(command("identify-control", probe, log, "--machine", "vmc", *OFFSET, "--json"))
+        assert any("outside the profile" in text for text in found["warnings"]) == is_outside, found
+
+
+def test_log_without_parameters_is_unusable(tmp_path: Path) -> None:
+    program, log, out = (tmp_path / name for name in ("line.nc", "log.csv", "mine.yaml"))
+    program.write_text("G21 G90 G94 G17 G61\nG0 X-90 Y-90\nG1 X-60 Y-70 F600\nM2\n")
+    command("psec", program, "--machine", "vmc", *OFFSET, "--out", log)
+    words = ["identify-control", program, log, "--machine", "vmc", *OFFSET, "--out", out]
+    run = subprocess.run([COMMAND, *words], capture_output=True, text=True, timeout=120, check=False)
+    assert (run.returncode, out.exists()) == (1, False), run
+    assert "nothing in the log fits; the first cause: acceleration of X: no straight motion" in run.stderr, run.stderr
 
 
 def main(first: int, end: int, *, recorded: bool) -> None:

@@ -1,7 +1,8 @@
 //! Limits and filters of the axes, from straight motions of single axes between rests.
 
 use virtual_axes_core::config::{AxisKind, MachineConfig};
-use virtual_axes_core::units::{METER_PER_MINUTE, MILLISECOND, REVOLUTION, RPM};
+use virtual_axes_core::statistics::median;
+use virtual_axes_core::units::{METER_PER_MINUTE, MILLISECOND, REVOLUTION, RPM, Rounded};
 
 use super::ControlIdentification;
 use super::law::{ControlEstimate, FILTER_SHARE, RampLaw, Smoothing};
@@ -11,6 +12,8 @@ use crate::motion::{AXIS_COUNT, AXIS_LETTERS, PathControl};
 
 /// Relative difference of equal speeds.
 const SAME_SPEED: f64 = 5e-3;
+/// Fewest motions that show a feed override.
+const LEAST_MOTIONS: usize = 4;
 
 /// Straight motions of single axes between rests.
 pub(super) struct Axes<'a> {
@@ -87,6 +90,35 @@ impl<'a> Axes<'a> {
                 })
             });
         }
+    }
+
+    /// Returns a warning if most straight motions run at the same part of the programmed feed, and below rapid traverse.
+    pub fn feed_warning(&self, track: &Track<'_>) -> Option<String> {
+        let factors = track.motions.iter().enumerate().filter_map(|(index, motion)| {
+            if motion.arc.is_some() || !motion.is_linear() || motion.feed.is_infinite() {
+                return None;
+            }
+            let [start, end] = track.samples[index];
+            let constant = plateau(&track.places(index, start..end), track.log.accuracy)?;
+            let speed = constant.step / track.log.period;
+            let is_rapid = self.rapids.iter().zip(motion.direction()).any(|(rapids, part)| {
+                rapids.first().is_some_and(|rapid| speed * part.abs() > (1.0 - SAME_SPEED) * rapid)
+            });
+            (!is_rapid).then_some(speed / motion.feed)
+        });
+        let mut factors: Vec<f64> = factors.collect();
+        let factor = median(&mut factors)?;
+        let alike = factors.iter().filter(|other| (*other / factor - 1.0).abs() < SAME_SPEED).count();
+        let is_shown = alike >= LEAST_MOTIONS && 2 * alike > factors.len();
+        (is_shown && (factor - 1.0).abs() > SAME_SPEED).then(|| {
+            format!(
+                "{alike} of {} motions run at {factor:.4} of the programmed feed: the sampling rate is wrong, and {} Hz would \
+                 fit (--rate-hz), or the feed override is {} %",
+                factors.len(),
+                Rounded(1.0 / (track.log.period * factor)),
+                Rounded(100.0 * factor)
+            )
+        })
     }
 
     /// Returns true if a motion of one axis reaches its feed.

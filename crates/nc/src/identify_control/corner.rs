@@ -4,7 +4,7 @@
 //! samples near the corner. With the distance of the setpoints from the corner, which filters increase, it determines speed
 //! and radius.
 
-use super::law::{RampLaw, Smoothing};
+use super::law::{ControlEstimate, RampLaw, Smoothing};
 use super::ramp::plateau;
 use super::track::{Track, TrackedMotion, distance};
 use crate::motion::{AXIS_COUNT, Coordinates, PathControl};
@@ -31,7 +31,7 @@ pub(super) struct LineCorner {
     /// Speed of the lines, m/s.
     pub feed: f64,
     /// Smallest acceleration limit of the axes that move, m/s².
-    pub limit: f64,
+    pub limit: ControlEstimate,
     /// Speed in the corner, m/s.
     pub speed: f64,
     /// Radius of the path before the filters, m; 0 for the exact path.
@@ -84,7 +84,8 @@ impl LineCorner {
         };
         let jerks = [along(&directions[0], &jerk)?, along(&directions[1], &jerk)?];
         let moving = (0..AXIS_COUNT).filter(|&i| directions.iter().any(|direction| direction[i] != 0.0));
-        let limit = moving.filter_map(acceleration).fold(f64::INFINITY, f64::min);
+        let limits = moving.filter_map(|axis| law.accelerations[axis]);
+        let limit = limits.min_by(|a, b| a.value.total_cmp(&b.value))?;
         let lines = Lines { turn, feed, lost, accelerations, jerks };
         let mut filters = law.filters();
         let smoothing = track.log.accuracy.smoothing;

@@ -29,6 +29,7 @@ pub(super) fn identify_corners(track: &Track<'_>, law: &RampLaw, found: &mut Con
         );
         return;
     }
+    let limits: Vec<ControlEstimate> = blended.iter().map(|corner| corner.limit).collect();
     let mut choose = |value: &str, reason: String| {
         found.choices.push(("control.corners".to_owned(), value.to_owned(), reason));
     };
@@ -56,11 +57,11 @@ pub(super) fn identify_corners(track: &Track<'_>, law: &RampLaw, found: &mut Con
             },
         );
         let normal =
-            slowed.iter().filter(|c| c.radius > 0.0).map(|c| c.speed * c.speed / (c.radius * c.limit));
+            slowed.iter().filter(|c| c.radius > 0.0).map(|c| c.speed * c.speed / (c.radius * c.limit.value));
         if let Some(normal) = ControlEstimate::of(normal.collect(), 5e-3) {
             found.push(
                 "control.normal_fraction",
-                ControlEstimate { value: normal.value.min(1.0), ..normal },
+                ControlEstimate { value: normal.value.min(1.0), ..normal.divided_by(&limits) },
                 1.0,
                 "",
             );
@@ -92,7 +93,9 @@ pub(super) fn identify_corners(track: &Track<'_>, law: &RampLaw, found: &mut Con
     }
     // Normal acceleration of an arc within P, as a part of the limit.
     let normal = |corner: &&LineCorner| {
-        corner.tolerance().map(|tolerance| corner.speed.powi(2) * corner.bulge() / (tolerance * corner.limit))
+        corner
+            .tolerance()
+            .map(|tolerance| corner.speed.powi(2) * corner.bulge() / (tolerance * corner.limit.value))
     };
     let normals: Vec<f64> = slowed.iter().filter_map(normal).collect();
     let spreads = [spread(&steps), spread(&normals)];
@@ -125,13 +128,13 @@ pub(super) fn identify_corners(track: &Track<'_>, law: &RampLaw, found: &mut Con
     );
     let Some(normal) = ControlEstimate::of(normals, 5e-3) else { return };
     let open = slowed.iter().filter(|corner| corner.tolerance().is_none());
-    let open = open.map(|c| c.speed.powi(2) * c.bulge() / (normal.value * c.limit));
+    let open = open.map(|c| c.speed.powi(2) * c.bulge() / (normal.value * c.limit.value));
     if let Some(tolerance) = ControlEstimate::of(open.collect(), 1e-2) {
         found.push("control.corner_tolerance_mm", tolerance, 1e-3, "mm");
     }
     found.push(
         "control.normal_fraction",
-        ControlEstimate { value: normal.value.min(1.0), ..normal },
+        ControlEstimate { value: normal.value.min(1.0), ..normal.divided_by(&limits) },
         1.0,
         "",
     );

@@ -26,8 +26,6 @@ pub(super) const FILTER_SHARE: f64 = 2.0;
 const BETTER: f64 = 0.25;
 /// Relative difference of the squares of equal ramps.
 const SAME_RAMP: f64 = 0.01;
-/// Smallest share by which a ramp with a jerk limit shows its acceleration.
-const LEAST_ROOT: f64 = 0.02;
 /// Part of the squares of a ramp that filters leave to its acceleration.
 const LEAST_SHARE: f64 = 0.1;
 /// Jerk limits from which a search starts, as multiples of the acceleration over the time of a filter.
@@ -55,6 +53,13 @@ impl ControlEstimate {
         let square = values.iter().map(|x| (x - value).powi(2)).sum::<f64>() / (count.max(2) - 1) as f64;
         let half_width = (COVERAGE * (square / count as f64).sqrt()).max(relative * value.abs());
         Some(Self { value, half_width, count })
+    }
+
+    /// Adds the relative half widths of the limits by which it is divided; a limit of which a bound is known has none.
+    pub fn divided_by(self, limits: &[Self]) -> Self {
+        let of = |limit: &Self| limit.half_width / limit.value;
+        let relative = limits.iter().map(of).filter(|part| part.is_finite()).fold(0.0, f64::max);
+        Self { half_width: self.half_width.hypot(relative * self.value), ..self }
     }
 }
 
@@ -117,16 +122,6 @@ fn jerk_squares(speed: f64, acceleration: f64, jerk: f64) -> f64 {
     } else {
         2.0 * speed / jerk
     }
-}
-
-/// Returns the acceleration of a ramp with a known jerk limit, and how well the ramp shows it, 0 to 1; `None` if the ramp does
-/// not reach its acceleration.
-fn jerk_limited_acceleration(ramp: &SpeedRamp, jerk: f64) -> Option<[f64; 2]> {
-    // (v/a)² + (a/j)² is smallest, 2 v/j, where the acceleration is just reached.
-    let half = 0.5 * ramp.squares * jerk * jerk;
-    let root = half * half - (ramp.speed * jerk).powi(2);
-    let share = root / (half * half);
-    (share > LEAST_ROOT).then(|| [(half - root.sqrt()).sqrt(), share])
 }
 
 /// Fits acceleration and jerk of one axis; the values are their logarithms.
@@ -216,9 +211,8 @@ impl RampLaw {
         };
         let Some(fit) = filtered else {
             for &axis in &axes {
-                let values =
-                    ramps[axis].iter().map(|ramp| ramp.speed / ramp.squares.max(f64::MIN_POSITIVE).sqrt());
-                law.accelerations[axis] = ControlEstimate::of(values.collect(), 0.05);
+                let value = |ramp: &SpeedRamp| ramp.speed / ramp.squares.max(f64::MIN_POSITIVE).sqrt();
+                law.accelerations[axis] = ControlEstimate::of(ramps[axis].iter().map(value).collect(), 0.05);
             }
             return Some(law);
         };
@@ -232,7 +226,8 @@ impl RampLaw {
             let half_width = (0.5 * value * deviation / slope).max(1e-4 * value);
             law.accelerations[axis] = Some(ControlEstimate { value, half_width, count: ramps[axis].len() });
         }
-        if squares < (INTERPOLATION * period).powi(2).max(FILTER_SHARE * drive_squares) {
+        let shortest = (INTERPOLATION * period).powi(2).max(FILTER_SHARE * drive_squares);
+        if squares < shortest {
             return Some(law);
         }
         let jerks: Option<Vec<Fit>> = axes
@@ -269,6 +264,10 @@ impl RampLaw {
             }
         }
         let deviation = COVERAGE * fit.covariance[(unknowns - 1, unknowns - 1)].max(0.0).sqrt();
+        if squares - deviation < shortest {
+            law.is_ambiguous = false;
+            return Some(law);
+        }
         let deviation = deviation.hypot(drive_squares);
         law.smoothing = Smoothing::Filters(stages(ramps, &law.accelerations, [squares, deviation], period));
         Some(law)
@@ -280,7 +279,7 @@ impl RampLaw {
         match &self.smoothing {
             Smoothing::Jerk(jerks) => {
                 let least = axes.iter().try_fold(f64::INFINITY, |j, &axis| Some(j.min(jerks[axis]?.value)));
-                jerk_limited_acceleration(ramp, least?)
+                ramp.jerk_limited_acceleration(least?)
             }
             _ => {
                 let square = ramp.squares - self.filter_squares();
@@ -362,8 +361,7 @@ fn stages(
     let ratio = f64::midpoint(low, high);
     let [first, second] = split(ratio);
     let count = ramps.iter().map(Vec::len).sum();
-    let of =
-        |value: f64, spread: f64| ControlEstimate { value, half_width: spread.max(0.05 * period), count };
+    let of = |value: f64, width: f64| ControlEstimate { value, half_width: width.max(0.05 * period), count };
     let of_sum = |value: f64| 0.5 * deviation * value / squares;
     let least = residual(ratio);
     if shown.is_empty() || ratio < LEAST_STAGE || second < period || least > TWO_STAGES * residual(0.0) {

@@ -1,10 +1,11 @@
 //! Motions before and after a standstill: their acceleration, and the wait between them.
 
+use virtual_axes_core::statistics::mean;
 use virtual_axes_core::units::MILLISECOND;
 
 use super::ControlIdentification;
 use super::axes::Axes;
-use super::law::{ControlEstimate, RampLaw};
+use super::law::{ControlEstimate, RampLaw, Smoothing};
 use super::ramp::{plateau, ramp};
 use super::track::{Track, TrackedMotion};
 use crate::motion::PathControl;
@@ -14,7 +15,8 @@ const WHOLE: f64 = 0.015;
 
 /// Identifies the acceleration of motions before a standstill in G64, and beside corners in G61.
 pub(super) fn identify_ends(track: &Track<'_>, law: &RampLaw, found: &mut ControlIdentification) {
-    let [mut overlaps, mut kinks] = [Vec::new(), Vec::new()];
+    // Parts of the acceleration, and what they are divided by.
+    let [mut overlaps, mut kinks] = [const { (Vec::new(), Vec::new()) }; 2];
     let period = track.log.period;
     for (index, motion) in track.motions.iter().enumerate() {
         let Some(axis) = motion.single_axis().filter(|_| motion.feed.is_finite()) else { continue };
@@ -36,13 +38,18 @@ pub(super) fn identify_ends(track: &Track<'_>, law: &RampLaw, found: &mut Contro
         let Some(constant) = plateau(&places, track.log.accuracy) else { continue };
         let Some(ramp) = ramp(&places, &constant, period) else { continue };
         let acceleration = match law.is_limit(&ramp, axis) {
-            true => Some(limit.value),
-            false => law.acceleration(&ramp, &[axis]).map(|[a, _]| a),
+            true => Some([limit.value, 1.0]),
+            false => law.acceleration(&ramp, &[axis]),
         };
-        let parts = if is_blended { &mut overlaps } else { &mut kinks };
-        parts.extend(acceleration.map(|a| a / limit.value));
+        let Some([acceleration, share]) = acceleration else { continue };
+        let (parts, divisors) = if is_blended { &mut overlaps } else { &mut kinks };
+        parts.push(acceleration / limit.value);
+        divisors.extend([limit, ramp.square(share, track.log.accuracy.drive_squares)]);
     }
-    match ControlEstimate::of(overlaps, 2e-3) {
+    let estimate = |(parts, divisors): (Vec<f64>, Vec<ControlEstimate>)| {
+        ControlEstimate::of(parts, 2e-3).map(|estimate| estimate.divided_by(&divisors))
+    };
+    match estimate(overlaps) {
         Some(part) if part.value > 1.0 - WHOLE => {
             found.push("control.overlap_fraction", ControlEstimate { value: 1.0, ..part }, 1.0, "");
         }
@@ -52,7 +59,7 @@ pub(super) fn identify_ends(track: &Track<'_>, law: &RampLaw, found: &mut Contro
                 .to_owned(),
         ),
     }
-    match ControlEstimate::of(kinks, 2e-3) {
+    match estimate(kinks) {
         Some(part) if part.value > 1.0 - WHOLE => {
             found.push("control.kink_fraction", ControlEstimate { value: 1e-3, ..part }, 1.0, "");
         }
@@ -80,10 +87,17 @@ pub(super) fn identify_wait(track: &Track<'_>, axes: &Axes<'_>, found: &mut Cont
         let middle = usize::midpoint(constant.ends[0], constant.ends[1]);
         let at = |place: f64| (start + middle) as f64 + (place - constant.place) / constant.step;
         let speed = constant.step / period * (motion.to[axis] - motion.from[axis]).abs() / motion.length;
-        let ramp = axes.law.as_ref()?.ramp_time(axis, speed)?;
-        axes.reaches(axis, motion, speed).then(|| (at(0.0) * period, at(motion.length) * period, 0.5 * ramp))
+        let law = axes.law.as_ref()?;
+        let ramp = ControlEstimate { value: 0.5 * law.ramp_time(axis, speed)?, half_width: 0.0, count: 1 };
+        let ramp = ramp.divided_by(law.accelerations[axis].as_slice());
+        axes.reaches(axis, motion, speed).then(|| (at(0.0) * period, at(motion.length) * period, ramp))
     };
     let filters: f64 = axes.law.as_ref().map_or(0.0, |law| law.filters().iter().sum());
+    let of_filters = match axes.law.as_ref().map(|law| &law.smoothing) {
+        Some(Smoothing::Filters(stages)) => stages.iter().map(|stage| stage.half_width).sum(),
+        _ => 0.0,
+    };
+    let mut of_ramps = Vec::new();
     let waits = (0..track.motions.len()).filter_map(|index| {
         let dwell = track.motions[index].dwell?;
         let is_blended = |motion: &TrackedMotion| matches!(motion.path_control, PathControl::Blend(_));
@@ -92,11 +106,13 @@ pub(super) fn identify_wait(track: &Track<'_>, axes: &Axes<'_>, found: &mut Cont
             return None;
         }
         let ((_, end, braking), (start, _, starting)) = (ends(index)?, ends(index + 1)?);
-        Some(start - starting - end - braking - dwell - filters)
+        of_ramps.push(starting.half_width + braking.half_width);
+        Some(start - starting.value - end - braking.value - dwell - filters)
     });
     match ControlEstimate::of(waits.collect(), 0.0) {
         Some(wait) => {
             let half_width = wait.half_width.max(0.1 * period).max(0.5 * track.log.accuracy.smoothing);
+            let half_width = half_width.hypot(mean(&of_ramps).unwrap_or(0.0)).hypot(of_filters);
             let wait = ControlEstimate { value: wait.value.max(0.0), half_width, ..wait };
             found.push("control.wait_ms", wait, MILLISECOND, "ms");
         }

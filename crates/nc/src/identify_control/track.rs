@@ -6,6 +6,7 @@ use crate::motion::{
     ProgramStep, is_rotary,
 };
 use std::f64::consts::{PI, TAU};
+use virtual_axes_core::units::Rounded;
 
 /// Length that counts for one radian of a rotary axis, m.
 pub(super) const ROTARY_LENGTH: f64 = 0.1;
@@ -13,6 +14,18 @@ pub(super) const ROTARY_LENGTH: f64 = 0.1;
 const START_DISTANCE: f64 = 5e-5;
 /// Largest distance of a sample from its motion, m, besides a fifth of the motion.
 const MOST_DISTANCE: f64 = 5e-3;
+
+/// Factors of positions in a wrong unit, the right one, and the wrong one.
+const UNITS: [(f64, &str, &str); 6] = [
+    (1e3, "mm", "m"),
+    (25.4, "mm", "in"),
+    (1e3 / 25.4, "in", "m"),
+    (1e-3, "m", "mm"),
+    (1.0 / 25.4, "in", "mm"),
+    (25.4e-3, "m", "in"),
+];
+/// Relative difference of equal distances in different units.
+const SAME_UNIT: f64 = 0.2;
 
 /// TrackedMotion of a program.
 #[derive(Debug, Clone)]
@@ -203,9 +216,10 @@ impl<'a> Track<'a> {
             (false, Some(sample)) if motions.len() > 1 => (1, sample),
             _ => {
                 return Err(format!(
-                    "no sample of the log is at the end of the first motion, line {}; compare work offset (--work-offset), \
-                     tool length and columns (--column)",
-                    first.line
+                    "no sample of the log is at the end of the first motion, line {}: {}the log starts late, or work offset \
+                     (--work-offset), tool length or columns (--column) differ",
+                    first.line,
+                    wrong_unit(log, &motions)
                 ));
             }
         };
@@ -241,18 +255,20 @@ impl<'a> Track<'a> {
         let (excess, motion, sample) = worst;
         if excess > MOST_DISTANCE {
             return Err(format!(
-                "the setpoints depart by {:.3} mm from line {} at {:.3} s: the log is not of this program, or work offset, \
-                 tool length or columns differ",
+                "the setpoints depart by {:.3} mm from line {} at {:.3} s: {}the log starts late or is not of this program, \
+                 or work offset (--work-offset), tool length or columns (--column) differ",
                 1e3 * (excess + 0.2 * motions[motion].length),
                 motions[motion].line,
-                sample as f64 * log.period
+                sample as f64 * log.period,
+                wrong_unit(log, &motions)
             ));
         }
         let left = motions.len() - 1 - current;
         if left > 0 {
             return Err(format!(
-                "the log ends on line {}; {left} motions of the program are left",
-                motions[current].line
+                "the log ends on line {}; {left} motions of the program are left: {}it ends early or starts late",
+                motions[current].line,
+                wrong_unit(log, &motions)
             ));
         }
         let LogAccuracy { resolution, window, .. } = log.accuracy;
@@ -307,6 +323,34 @@ impl<'a> Track<'a> {
         };
         range.map(place).collect()
     }
+}
+
+/// Returns the reason if the log has positions in a wrong unit, by the largest distance that an axis moves; otherwise nothing.
+fn wrong_unit(log: &ControlLog, motions: &[TrackedMotion]) -> String {
+    let range = |positions: &mut dyn Iterator<Item = f64>| {
+        let [low, high] = positions.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], position| {
+            [low.min(position), high.max(position)]
+        });
+        (high - low).max(0.0)
+    };
+    let ends = |axis: usize| range(&mut motions.iter().skip(1).map(|motion| motion.to[axis]));
+    let Some(axis) = (0..AXIS_COUNT)
+        .filter(|&axis| !is_rotary(axis) && log.has_axis[axis])
+        .max_by(|a, b| ends(*a).total_cmp(&ends(*b)))
+    else {
+        return String::new();
+    };
+    let factor = range(&mut log.positions.iter().map(|position| position[axis])) / ends(axis);
+    let found = UNITS.iter().find(|(of_unit, ..)| (factor / of_unit - 1.0).abs() < SAME_UNIT);
+    found.map_or_else(String::new, |(of_unit, right, wrong)| {
+        let letter = AXIS_LETTERS[axis];
+        format!(
+            "{letter} moves {} times as far as in the program: its unit is {right}, not {wrong} (--column \
+             {}=COLUMN[{right}]); otherwise ",
+            Rounded(*of_unit),
+            letter.to_ascii_lowercase()
+        )
+    })
 }
 
 impl TrackedMotion {

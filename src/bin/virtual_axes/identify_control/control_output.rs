@@ -6,6 +6,9 @@ use virtual_axes_report::Table;
 
 use crate::output::text_table;
 
+/// Relative difference of the times of the program in the log and in the profile that is reported.
+const SAME_TIME: f64 = 0.01;
+
 /// Identified profile, and the time of the program in it, s, or why it cannot be planned.
 pub(super) struct ControlOutput<'a> {
     pub found: &'a ControlIdentification,
@@ -40,6 +43,23 @@ impl ControlOutput<'_> {
                 self.found.values.len()
             ),
         }
+    }
+
+    /// Returns the warnings, with one if the program takes another time in the profile than in the log and no other cause is
+    /// known.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = self.found.warnings.clone();
+        let change = self.planned.as_ref().map_or(0.0, |planned| planned / self.found.motion_time - 1.0);
+        if change.abs() > SAME_TIME && warnings.is_empty() && !self.found.values.is_empty() {
+            warnings.push(format!(
+                "the program takes {:.1} % {} time in the profile than in the log: the control has properties outside the profile \
+                 (a jerk limit together with filters, exponential filters), or the log has other motions before or behind the \
+                 program; values can be wrong beyond their intervals",
+                100.0 * change.abs(),
+                if change > 0.0 { "more" } else { "less" }
+            ));
+        }
+        warnings
     }
 
     /// Returns verdict, parameters, choices and what the program cannot show.
@@ -94,6 +114,7 @@ impl ControlOutput<'_> {
             "values": values.collect::<Vec<_>>(),
             "choices": choices.collect::<Vec<_>>(),
             "not_shown": self.found.not_shown,
+            "warnings": self.warnings(),
             "motions": self.found.motions,
             "log_time_s": self.found.motion_time,
             "profile_time_s": self.planned.as_ref().ok(),

@@ -21,9 +21,12 @@ use crate::arguments::variant;
 use crate::builtin::PROGRAMS;
 use crate::input::part_program::{PartProgramArguments, no_part_program};
 use crate::input::{CommandInput, must_not_replace};
-use crate::output::{interrupt, machine_file};
+use crate::output::unusable::UnusableResult;
+use crate::output::{interrupt, machine_file, print_error};
 use control_output::ControlOutput;
 
+/// Exit status of a log that shows no parameter.
+const NO_PARAMETER: u8 = 1;
 /// Value of the last digit of positions without known digits, m or rad.
 const RESOLUTION: f64 = 1e-9;
 
@@ -77,6 +80,7 @@ pub fn run(arguments: &IdentifyControlArguments) -> Result<String, Box<dyn Error
     // All errors of the program at once.
     program.survey(&config.without_trajectory_limits(), &mut |_| ())?;
     let mut log = read_log(&input, &config)?;
+    log.notes.iter().for_each(|note| print_error(&format!("note: {}: {note}", arguments.setpoints)));
     if arguments.recorded_positions {
         log = log.setpoints_of(&config).map_err(|error| format!("{}: {error}", arguments.setpoints))?;
     }
@@ -95,6 +99,24 @@ pub fn run(arguments: &IdentifyControlArguments) -> Result<String, Box<dyn Error
     let mut identified = parameters.clone();
     set_values(&mut identified, &found)?;
     let planned = planned_time(name, &identified.machine_config()?, &options);
+    let output = ControlOutput { found: &found, planned };
+    let text = match arguments.output.format() {
+        OutputFormat::Json => format!("{:#}\n", output.json()),
+        OutputFormat::Csv => output.csv(),
+        OutputFormat::Quiet => output.verdict(),
+        OutputFormat::Text => output.text(),
+    };
+    for warning in output.warnings() {
+        print_error(&format!("warning: {}: {warning}", arguments.setpoints));
+    }
+    if found.values.is_empty() {
+        let cause = found.not_shown.first().map_or("the program has no motion", String::as_str);
+        let reason = format!(
+            "{}: no parameter is identified, since nothing in the log fits; the first cause: {cause}",
+            arguments.setpoints
+        );
+        return Err(Box::new(UnusableResult { text, reason, status: NO_PARAMETER }));
+    }
     if let Some(out) = &arguments.out {
         let head = format!(
             "{}, from the machine {} by `virtual_axes identify-control`: the control profile is that of {} and {}.",
@@ -110,13 +132,7 @@ pub fn run(arguments: &IdentifyControlArguments) -> Result<String, Box<dyn Error
         };
         machine_file::write(out, &identified.to_yaml(&head, comment))?;
     }
-    let output = ControlOutput { found: &found, planned };
-    Ok(match arguments.output.format() {
-        OutputFormat::Json => format!("{:#}\n", output.json()),
-        OutputFormat::Csv => output.csv(),
-        OutputFormat::Quiet => output.verdict(),
-        OutputFormat::Text => output.text(),
-    })
+    Ok(text)
 }
 
 /// Reads the samples of a log.
@@ -127,7 +143,8 @@ fn read_log(input: &CommandInput, machine: &MachineConfig) -> Result<ControlLog,
     };
     let joints = source.joints().to_vec();
     let mut row = vec![0.0; joints.len()];
-    let mut rows = Vec::new();
+    let mut rows: Vec<(f64, Vec<f64>)> = Vec::new();
+    let mut line = 0;
     // Programs omit zeros at the end of numbers.
     let mut resolution = f64::INFINITY;
     loop {
@@ -140,6 +157,10 @@ fn read_log(input: &CommandInput, machine: &MachineConfig) -> Result<ControlLog,
         };
         for row in new {
             resolution = row.resolutions.iter().copied().fold(resolution, f64::min);
+            // The start positions, which the reader adds before a first row behind time 0, are no sample.
+            if std::mem::replace(&mut line, row.line) == row.line {
+                rows.clear();
+            }
             rows.push((seconds(row.time), row.positions));
         }
         if !has_row {
