@@ -2,7 +2,7 @@
 //! (`recorded_positions`).
 //!
 //! 1. Each sample of the log is assigned to a motion of the program (`track`).
-//! 2. Ramps from rest to a constant speed show acceleration, jerk limit and filters of the axes (`axes`, `ramp`, `law`).
+//! 2. Ramps from rest to a constant speed show acceleration, jerk limit and filters of the axes (`axis_motions`, `ramp`, `law`).
 //! 3. Corners show path and speed (`corner`, `corner_rule`), circles the parts of the acceleration across and along the path
 //!    (`arcs`), rows of short lines the block cycle and the look-ahead (`blocks`), dwells the wait at standstills
 //!    (`standstill`).
@@ -10,7 +10,7 @@
 //! All values are in closed form from the log; the planner has no part in them.
 
 mod arcs;
-mod axes;
+mod axis_motions;
 mod blocks;
 mod corner;
 mod corner_rule;
@@ -28,7 +28,7 @@ pub use self::log::ControlLog;
 pub use self::probe::probe_program;
 
 use self::arcs::identify_circles;
-use self::axes::Axes;
+use self::axis_motions::AxisMotions;
 use self::blocks::identify_blocks;
 use self::corner_rule::identify_corners;
 use self::law::{ControlEstimate, Smoothing};
@@ -106,7 +106,7 @@ pub fn identify_control<E: std::fmt::Display>(
     let mut found =
         ControlIdentification { motions: track.motions.len(), ..ControlIdentification::default() };
     found.motion_time = motion_time(&track);
-    let axes = Axes::new(machine, &track);
+    let axes = AxisMotions::new(machine, &track);
     found.warnings.extend(axes.feed_warning(&track));
     axes.identify(&mut found);
     if let Some(law) = &axes.law {

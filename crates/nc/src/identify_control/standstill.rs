@@ -4,7 +4,7 @@ use virtual_axes_core::statistics::mean;
 use virtual_axes_core::units::MILLISECOND;
 
 use super::ControlIdentification;
-use super::axes::Axes;
+use super::axis_motions::AxisMotions;
 use super::law::{ControlEstimate, RampLaw, Smoothing};
 use super::ramp::{plateau, ramp};
 use super::track::{Track, TrackedMotion};
@@ -75,7 +75,7 @@ pub(super) fn identify_ends(track: &Track<'_>, law: &RampLaw, found: &mut Contro
 
 /// Identifies the wait at standstills: the time between two ramps of single axes, less what they and the dwell last. Filters
 /// delay both ramps alike.
-pub(super) fn identify_wait(track: &Track<'_>, axes: &Axes<'_>, found: &mut ControlIdentification) {
+pub(super) fn identify_wait(track: &Track<'_>, axes: &AxisMotions<'_>, found: &mut ControlIdentification) {
     let period = track.log.period;
     // Times at which the line of constant speed starts at the start of the motion, and reaches its end.
     let ends = |index: usize| {

@@ -22,7 +22,7 @@ const SHIFTS: [u32; 23] = [
 /// M codes without motion, and without another place in the program.
 const AUXILIARY: [u32; 16] = [0, 1, 3, 4, 5, 7, 8, 9, 10, 11, 13, 14, 19, 29, 48, 49];
 
-/// What is known at the start of a line.
+/// Position and compensation that are known at the start of a line.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct LineStart {
     /// Axes whose programmed position is known.

@@ -181,7 +181,7 @@ impl ProgramModel {
                 _ if count.get(&motion.line) != Some(&1) => "executed more than once, or several motions",
                 (MotionKind::Nurbs(_) | MotionKind::Rapid, _) => "spline",
                 _ if !modes.is_plain
-                    || self.start_of(motion.line).is_compensated
+                    || start_of(&self.starts, motion.line).is_compensated
                     || !matches!(motion.feed, Feed::Linear(_)) =>
                 {
                     "cycle, probing, compensation, rotation, scaling or feed that is not per minute"
@@ -206,14 +206,9 @@ impl ProgramModel {
             .collect()
     }
 
-    /// Returns what is known at the start of a line, from 1; nothing for a line of another file.
-    fn start_of(&self, line: usize) -> LineStart {
-        self.starts.get(line.wrapping_sub(1)).copied().unwrap_or_default()
-    }
-
     /// Returns true if a line begins at a position that the program has given for all axes that it moves.
     fn is_start_known(&self, motion: &ProgramMotion, modes: &LineModes, words: &WordLine) -> bool {
-        let known = self.start_of(motion.line).known;
+        let known = start_of(&self.starts, motion.line).known;
         let is_in_plane = |axis: usize| match &motion.kind {
             MotionKind::Arc(arc) => arc.plane.axes()[..2].contains(&axis),
             _ => false,
@@ -254,7 +249,7 @@ impl ProgramModel {
             at,
             is_fixed: is_fixed || !is_shifted,
             free: Vector3::from_fn(|axis, _| {
-                let is_known = modes.is_incremental || self.start_of(motion.line).known[axis];
+                let is_known = modes.is_incremental || start_of(&self.starts, motion.line).known[axis];
                 f64::from(u8::from(is_known || self.words[&motion.line].has(AXIS_LETTERS[axis])))
             }),
         };
@@ -430,6 +425,11 @@ impl ProgramModel {
     pub fn line(&self, line: usize) -> &str {
         self.lines.get(line.saturating_sub(1)).map_or("", |text| text.trim())
     }
+}
+
+/// Returns what is known at the start of a line, from 1; nothing for a line of another file.
+fn start_of(starts: &[LineStart], line: usize) -> LineStart {
+    starts.get(line.wrapping_sub(1)).copied().unwrap_or_default()
 }
 
 /// Returns true if a rotary axis turns.

@@ -16,7 +16,7 @@ const SAME_SPEED: f64 = 5e-3;
 const LEAST_MOTIONS: usize = 4;
 
 /// Straight motions of single axes between rests.
-pub(super) struct Axes<'a> {
+pub(super) struct AxisMotions<'a> {
     machine: &'a MachineConfig,
     ramps: Vec<Vec<SpeedRamp>>,
     /// Programmed feeds of the ramps.
@@ -28,7 +28,7 @@ pub(super) struct Axes<'a> {
     shortest: f64,
 }
 
-impl<'a> Axes<'a> {
+impl<'a> AxisMotions<'a> {
     pub fn new(machine: &'a MachineConfig, track: &Track<'_>) -> Self {
         let mut axes = Self {
             machine,
