@@ -118,7 +118,7 @@ class RobustnessResult:
     def __repr__(self) -> str:
         """Returns the costs without deviation and at worst."""
         costs = f"{self.nominal_cost:.6g} nominal, {self.worst_cost:.6g} at worst"
-        return f"RobustnessResult(cost {' '.join([costs, self.summary['cost_unit']]).rstrip()})"
+        return f"RobustnessResult(cost {', '.join(filter(None, [costs, self.summary['cost_unit']]))})"
 
 
 def robustness(machine: Machine, psec: Setpoints, *, by: float = 0.3, cost: str = "contour") -> RobustnessResult:
