@@ -1,8 +1,9 @@
 //! Parts of the acceleration on arcs, across and along the path.
 
-use super::ControlIdentification;
+use super::control_estimate::ControlEstimate;
 use super::corner::CORNER_SPEEDS;
-use super::law::{ControlEstimate, RampLaw};
+use super::identification::ControlIdentification;
+use super::law::RampLaw;
 use super::ramp::{plateau, ramp};
 use super::track::Track;
 

@@ -4,8 +4,9 @@ use virtual_axes_core::config::{AxisKind, MachineConfig};
 use virtual_axes_core::statistics::median;
 use virtual_axes_core::units::{METER_PER_MINUTE, MILLISECOND, REVOLUTION, RPM, Rounded};
 
-use super::ControlIdentification;
-use super::law::{ControlEstimate, FILTER_SHARE, RampLaw, Smoothing};
+use super::control_estimate::ControlEstimate;
+use super::identification::ControlIdentification;
+use super::law::{FILTER_SHARE, RampLaw, Smoothing};
 use super::ramp::{SpeedRamp, plateau, ramp};
 use super::track::{Track, TrackedMotion};
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, PathControl};

@@ -2,8 +2,9 @@
 
 use virtual_axes_core::units::MILLISECOND;
 
-use super::ControlIdentification;
-use super::law::{ControlEstimate, RampLaw};
+use super::control_estimate::ControlEstimate;
+use super::identification::ControlIdentification;
+use super::law::RampLaw;
 use super::track::Track;
 
 /// Fewest lines of a row.

@@ -4,7 +4,8 @@
 //! samples near the corner. With the distance of the setpoints from the corner, which filters increase, it determines speed
 //! and radius.
 
-use super::law::{ControlEstimate, RampLaw, Smoothing};
+use super::control_estimate::ControlEstimate;
+use super::law::{RampLaw, Smoothing};
 use super::ramp::plateau;
 use super::track::{Track, TrackedMotion, distance};
 use crate::motion::{AXIS_COUNT, Coordinates, PathControl};

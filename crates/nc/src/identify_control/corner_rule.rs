@@ -3,9 +3,10 @@
 use virtual_axes_core::statistics::{mean, rms};
 use virtual_axes_core::units::METER_PER_MINUTE;
 
-use super::ControlIdentification;
+use super::control_estimate::ControlEstimate;
 use super::corner::{CORNER_SPEEDS, LineCorner};
-use super::law::{ControlEstimate, RampLaw};
+use super::identification::ControlIdentification;
+use super::law::RampLaw;
 use super::track::Track;
 
 /// A rule of arcs has more than one arc in this number of corners.

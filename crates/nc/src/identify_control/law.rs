@@ -2,19 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::control_estimate::{COVERAGE, ControlEstimate};
 use super::ramp::{SpeedRamp, distance};
 
-/// Value with the half width of its interval of 95 %.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ControlEstimate {
-    pub value: f64,
-    pub half_width: f64,
-    /// Number of motions that it is from.
-    pub count: usize,
-}
-
-/// Multiple of the standard deviation of an interval of 95 %.
-const COVERAGE: f64 = 2.0;
 /// Relative uncertainty of a ramp, and its part of the square of the sampling period.
 const RELATIVE: f64 = 1e-3;
 const OF_PERIOD: f64 = 0.1;
@@ -39,29 +29,6 @@ const THIRDS: usize = 25;
 const RATIO_STEP: f64 = 0.05;
 /// Shortest length of a box in the shape of a ramp, sampling periods.
 const LEAST_BOX: f64 = 0.3;
-
-impl ControlEstimate {
-    /// Returns the median of values; the interval is that of the mean, and at least `relative` of the value.
-    pub fn of(mut values: Vec<f64>, relative: f64) -> Option<Self> {
-        values.sort_by(f64::total_cmp);
-        let count = values.len();
-        let value = match count {
-            0 => return None,
-            _ if count % 2 == 1 => values[count / 2],
-            _ => f64::midpoint(values[count / 2 - 1], values[count / 2]),
-        };
-        let square = values.iter().map(|x| (x - value).powi(2)).sum::<f64>() / (count.max(2) - 1) as f64;
-        let half_width = (COVERAGE * (square / count as f64).sqrt()).max(relative * value.abs());
-        Some(Self { value, half_width, count })
-    }
-
-    /// Adds the relative half widths of the limits by which it is divided; a limit of which a bound is known has none.
-    pub fn divided_by(self, limits: &[Self]) -> Self {
-        let of = |limit: &Self| limit.half_width / limit.value;
-        let relative = limits.iter().map(of).filter(|part| part.is_finite()).fold(0.0, f64::max);
-        Self { half_width: self.half_width.hypot(relative * self.value), ..self }
-    }
-}
 
 /// Shape of the ramps.
 #[derive(Debug, Clone, PartialEq)]

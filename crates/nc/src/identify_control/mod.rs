@@ -12,8 +12,10 @@
 mod arcs;
 mod axis_motions;
 mod blocks;
+mod control_estimate;
 mod corner;
 mod corner_rule;
+mod identification;
 mod law;
 mod log;
 mod probe;
@@ -24,6 +26,7 @@ mod track;
 
 use virtual_axes_core::config::MachineConfig;
 
+pub use self::identification::{ControlIdentification, ControlValue};
 pub use self::log::ControlLog;
 pub use self::probe::probe_program;
 
@@ -31,66 +34,10 @@ use self::arcs::identify_circles;
 use self::axis_motions::AxisMotions;
 use self::blocks::identify_blocks;
 use self::corner_rule::identify_corners;
-use self::law::{ControlEstimate, Smoothing};
+use self::law::Smoothing;
 use self::standstill::{identify_ends, identify_wait};
 use self::track::{Track, motions};
 use crate::motion::ProgramStep;
-
-/// Identified parameter.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ControlValue {
-    /// Key of the parameter.
-    pub key: String,
-    /// Value, in the unit of the parameter.
-    pub value: f64,
-    /// Half width of its interval of 95 %.
-    pub half_width: f64,
-    /// Unit.
-    pub unit: &'static str,
-    /// Number of motions that show it.
-    pub count: usize,
-}
-
-/// Profile of a control.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ControlIdentification {
-    /// Numbers.
-    pub values: Vec<ControlValue>,
-    /// Choices: key, value and reason.
-    pub choices: Vec<(String, String, String)>,
-    /// Properties that the program cannot show, each with the remedy.
-    pub not_shown: Vec<String>,
-    /// Time from the first to the last motion in the log, s.
-    pub motion_time: f64,
-    /// Number of motions of the program.
-    pub motions: usize,
-    /// Causes for which values can be wrong.
-    pub warnings: Vec<String>,
-}
-
-impl ControlValue {
-    /// Returns the magnitude to which relative uncertainties apply: that of the acceleration which remains beside a corner.
-    fn magnitude(&self) -> f64 {
-        if self.key == "control.kink_fraction" { 1.0 - self.value } else { self.value }
-    }
-
-    /// Returns true if the interval excludes values without meaning. A wait can be 0.
-    fn is_identified(&self) -> bool {
-        self.half_width < self.magnitude() || (self.key == "control.wait_ms" && self.half_width.is_finite())
-    }
-}
-
-impl ControlIdentification {
-    fn push(&mut self, key: impl Into<String>, estimate: ControlEstimate, factor: f64, unit: &'static str) {
-        self.values.push(ControlValue {
-            key: key.into(),
-            value: estimate.value / factor,
-            half_width: estimate.half_width / factor,
-            unit,
-            count: estimate.count,
-        });
-    }
-}
 
 /// Identifies the profile of a control from the steps of a program and the setpoints that it made of them.
 ///

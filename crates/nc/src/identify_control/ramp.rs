@@ -4,7 +4,7 @@
 //! T = a/j, widen it by another box. The variance of boxes adds: 12 × variance = Σ L². A sum over sampled positions, in place
 //! of their differences, keeps the influence of rounding low. The shape of the positions tells one box from two.
 
-use super::law::ControlEstimate;
+use super::control_estimate::ControlEstimate;
 use super::log::LogAccuracy;
 
 /// SpeedRamp from rest to a constant speed.

@@ -3,9 +3,10 @@
 use virtual_axes_core::statistics::mean;
 use virtual_axes_core::units::MILLISECOND;
 
-use super::ControlIdentification;
 use super::axis_motions::AxisMotions;
-use super::law::{ControlEstimate, RampLaw, Smoothing};
+use super::control_estimate::ControlEstimate;
+use super::identification::ControlIdentification;
+use super::law::{RampLaw, Smoothing};
 use super::ramp::{plateau, ramp};
 use super::track::{Track, TrackedMotion};
 use crate::motion::PathControl;
