@@ -7,7 +7,7 @@
 use super::control_estimate::ControlEstimate;
 use super::log::LogAccuracy;
 
-/// SpeedRamp from rest to a constant speed.
+/// Ramp from rest to a constant speed.
 #[derive(Debug, Clone)]
 pub(super) struct SpeedRamp {
     /// Speed, in units of the places per second.

@@ -27,7 +27,7 @@ const UNITS: [(f64, &str, &str); 6] = [
 /// Relative difference of equal distances in different units.
 const SAME_UNIT: f64 = 0.2;
 
-/// TrackedMotion of a program.
+/// Motion of a program with its coordinates.
 #[derive(Debug, Clone)]
 pub(super) struct TrackedMotion {
     pub line: usize,

@@ -17,7 +17,7 @@ const ROTARY_ROUNDING: f64 = 1e-6;
 /// Text of a changed program.
 pub(in super::super) struct ChangedProgram {
     pub text: String,
-    /// CutPiece of each line, and its source line, from 1.
+    /// Piece of each line, and its source line, from 1.
     pub pieces: Vec<Option<usize>>,
     pub sources: Vec<usize>,
 }
