@@ -63,6 +63,37 @@ fn planned_setpoints_are_within_the_limits_in_every_format() {
 }
 
 #[test]
+fn jerk_is_not_checked_for_a_control_that_does_not_limit_it() {
+    let folder = TestFolder::new("audit_control");
+    let machine = |name: &str, is_limited: bool| {
+        let control = format!("    control: {{profile: linuxcnc, jerk_limited: {is_limited}}}\n");
+        let text = printed(&["machines", "--new", "vmc"]) + &control;
+        folder.file(name, text).to_str().expect("UTF-8").to_owned()
+    };
+    let program = folder.file("square.nc", "G21 G90 G61\nG0 X100\nG1 Y50 F3000\nX0\nY0\nM2\n");
+    let program = program.to_str().expect("UTF-8");
+    for is_limited in [false, true] {
+        let machine = machine(&format!("{is_limited}.yaml"), is_limited);
+        let output = run(&["check", program, "--machine", &machine, "--json"]);
+        let audit: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+        assert_eq!(output.status.code(), Some(0), "{audit}");
+        let axis = &audit["axes"]["x"];
+        assert!(axis["acceleration"].is_object());
+        assert_eq!(axis["jerk"].is_object(), is_limited, "{audit}");
+        assert_eq!(audit["notes"].as_array().expect("notes").len(), usize::from(!is_limited));
+        let text = printed(&["check", program, "--machine", &machine]);
+        assert!(text.ends_with("valid\n"), "{text}");
+        assert_eq!(text.contains("jerk is not checked"), !is_limited, "{text}");
+        // Setpoints that exceed the acceleration are beyond limits with either.
+        let faster = ["--set", "x.limits.acceleration_m_s2=6"];
+        let setpoints = folder.0.join("setpoints.csv").to_str().expect("UTF-8").to_owned();
+        printed(&[&["psec", program, "--machine", &machine, "--out", &setpoints], &faster[..]].concat());
+        let output = run(&["check", &setpoints, "--machine", &machine]);
+        assert_eq!(output.status.code(), Some(BEYOND));
+    }
+}
+
+#[test]
 fn each_limit_that_the_planner_did_not_know_is_found() {
     let folder = TestFolder::new("audit_planted");
     let options: [(&str, &[&str], f64); 3] = [

@@ -15,10 +15,10 @@ pub fn extremes(axis: &AuditedAxis) -> impl Iterator<Item = (&'static str, Extre
     extremes.zip(limits).map(|((name, extreme), limit)| (name, extreme, limit))
 }
 
-/// Returns a note for each limit that is smaller than the rounding errors of all differences.
+/// Returns a note for each limit that is smaller than the rounding errors of all differences, and one on jerk limits that
+/// the control does not keep.
 pub fn notes(audit: &LimitAudit) -> Vec<String> {
-    let quantities =
-        audit.moving().flat_map(|axis| axis.largest.iter().flatten().map(move |largest| (axis, largest)));
+    let quantities = audit.moving().flat_map(|axis| axis.limited().map(move |largest| (axis, largest)));
     let unchecked = quantities.filter(|(_, largest)| largest.least_rounding > largest.value.allowed);
     let note = |(axis, LargestUse { value, least_rounding, .. }): (&AuditedAxis, &LargestUse)| {
         let (name, size, unit) = describe(value.quantity, axis.kind);
@@ -30,7 +30,9 @@ pub fn notes(audit: &LimitAudit) -> Vec<String> {
             Rounded(value.allowed / size)
         )
     };
-    unchecked.map(note).collect()
+    let has_no_jerk_limit = audit.moving().any(|axis| axis.limits.jerk.is_infinite());
+    let no_jerk_limit = "jerk is not checked: the control does not limit it (control.jerk_limited is false)";
+    unchecked.map(note).chain(has_no_jerk_limit.then(|| no_jerk_limit.to_owned())).collect()
 }
 
 /// Returns the audit of the setpoints of `input`, with a duration in s, as one JSON object.
@@ -59,7 +61,7 @@ fn axes_json(audit: &LimitAudit) -> Value {
             });
             (name.replace(' ', "_"), value)
         });
-        let quantities = axis.largest.iter().flatten().map(|largest| {
+        let quantities = axis.limited().map(|largest| {
             let LargestUse { value, place, beyond, .. } = largest;
             let (name, size, unit) = describe(value.quantity, axis.kind);
             let value = json!({
@@ -96,8 +98,7 @@ pub fn excess(audit: &LimitAudit) -> Option<String> {
             axis.name
         ));
     }
-    let quantities =
-        audit.moving().flat_map(|axis| axis.largest.iter().flatten().map(move |largest| (axis, largest)));
+    let quantities = audit.moving().flat_map(|axis| axis.limited().map(move |largest| (axis, largest)));
     let beyond = quantities.filter(|(_, largest)| largest.beyond > 0);
     let (axis, largest) = beyond.max_by(|(_, a), (_, b)| a.value.ratio().total_cmp(&b.value.ratio()))?;
     let value = largest.value;

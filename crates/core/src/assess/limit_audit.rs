@@ -51,7 +51,7 @@ pub struct AuditedAxis {
     pub name: String,
     /// Kind of the axis.
     pub kind: AxisKind,
-    /// Limits of the axis.
+    /// Limits of the axis; the jerk is unlimited if the control does not limit it.
     pub limits: LimitsConfig,
     /// Value of the last digit of the positions, m or rad; 0 for exact numbers.
     resolution: f64,
@@ -113,6 +113,11 @@ impl AuditedAxis {
         self.extremes.is_some_and(|extremes| extremes.iter().any(|extreme| extreme.beyond > 0))
     }
 
+    /// Returns the largest values of limited derivatives.
+    pub fn limited(&self) -> impl Iterator<Item = &LargestUse> {
+        self.largest.iter().flatten().filter(|largest| largest.value.allowed.is_finite())
+    }
+
     /// Returns true if the setpoints of the axis move.
     pub fn moves(&self) -> bool {
         self.extremes.is_some_and(|[lowest, highest]| highest.position > lowest.position)
@@ -149,10 +154,16 @@ pub struct LimitAudit {
 impl LimitAudit {
     /// Creates the audit for the limits of a machine.
     pub fn new(machine: &MachineConfig) -> Self {
+        let limits = |mut limits: LimitsConfig| {
+            if !machine.control().has_jerk_limits() {
+                limits.jerk = f64::INFINITY;
+            }
+            limits
+        };
         let axes = machine.axes().iter().map(|axis| AuditedAxis {
             name: axis.name().to_owned(),
             kind: axis.kind(),
-            limits: *axis.limits(),
+            limits: limits(*axis.limits()),
             resolution: 0.0,
             window: [0.0; WINDOW],
             extremes: None,

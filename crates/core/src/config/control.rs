@@ -123,6 +123,11 @@ impl Default for ControlConfig {
 }
 
 impl ControlConfig {
+    /// Returns true if setpoints of the control keep the jerk limits of the axes.
+    pub fn has_jerk_limits(&self) -> bool {
+        self.profile == ControlProfile::Own || self.is_jerk_limited
+    }
+
     /// Returns the time by which the filters of the setpoints delay the end of a motion, s.
     pub fn filter_time(&self) -> f64 {
         self.filter_1 + self.filter_2

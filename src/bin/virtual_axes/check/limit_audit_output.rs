@@ -12,8 +12,7 @@ use crate::output::text_table;
 const HEADINGS: [&str; 9] =
     ["axis", "quantity", "unit", "largest", "limit", "ratio", "time, s", "setpoints beyond", "line"];
 
-/// Returns a table with a row per quantity of each moving axis, and notes on limits that the digits of the file are too
-/// few to check; empty if no axis moves.
+/// Returns a table with a row per quantity of each moving axis, and notes on limits that are not checked; empty if no axis moves.
 pub fn text(audit: &LimitAudit) -> String {
     let column = |name: &str| TableColumn { name: name.to_owned(), unit: String::new(), run: None };
     let mut rows: Vec<Vec<String>> = audit.moving().flat_map(rows).collect();
@@ -50,7 +49,7 @@ fn rows(axis: &AuditedAxis) -> Vec<Vec<String>> {
             extreme.beyond,
         ));
     }
-    for largest in axis.largest.iter().flatten() {
+    for largest in axis.limited() {
         let LargestUse { value, place, beyond, .. } = largest;
         let (name, size, unit) = describe(value.quantity, axis.kind);
         let numbers = [value.found / size, value.allowed / size, value.ratio()];
