@@ -21,6 +21,7 @@ mod log;
 mod probe;
 mod ramp;
 mod recorded_positions;
+mod rest_deviation;
 mod standstill;
 mod track;
 
@@ -53,6 +54,7 @@ pub fn identify_control<E: std::fmt::Display>(
     let mut found =
         ControlIdentification { motions: track.motions.len(), ..ControlIdentification::default() };
     found.motion_time = motion_time(&track);
+    found.warnings.extend(track.warnings.iter().cloned());
     let axes = AxisMotions::new(machine, &track);
     found.warnings.extend(axes.feed_warning(&track));
     axes.identify(&mut found);
@@ -247,6 +249,21 @@ mod tests {
         for (key, value, half_width, expected) in cases {
             let value = ControlValue { key: key.to_owned(), value, half_width, unit: "", count: 1 };
             assert_eq!(value.is_identified(), expected, "{value:?}");
+        }
+    }
+
+    #[test]
+    fn a_scaled_axis_is_named_and_keeps_its_accelerations() {
+        let probe = Probe::new();
+        let mut rows = probe.rows(|k| 1e-3 * k as f64, 1.0);
+        rows.iter_mut().for_each(|(_, row)| row[1] *= 1.0003);
+        let (found, _) = probe.identified(&rows, 1e-9).unwrap();
+        let [warning] = found.warnings.as_slice() else { panic!("{:?}", found.warnings) };
+        assert!(warning.starts_with("Y rests up to") && warning.contains("scale of 1.0003"), "{warning}");
+        for axis in ["x", "y", "z"] {
+            let key = format!("{axis}.limits.acceleration_m_s2");
+            let value = found.values.iter().find(|value| value.key == key).expect("an acceleration");
+            assert!((value.value / 4.0 - 1.0).abs() < 5e-4, "{value:?}");
         }
     }
 
