@@ -233,3 +233,34 @@ fn an_invalid_result_is_printed_but_not_written() {
     assert!(stderr.contains("; check torque constant"), "{stderr}");
     assert!(folder.names().is_empty());
 }
+
+#[test]
+fn intervals_contain_the_drive_if_every_second_position_cycle_is_recorded() {
+    let folder = TestFolder::new("identify_thinned");
+    let [psec, whole, thinned] = ["psec.csv", "whole.csv", "thinned.csv"].map(|name| folder.path(name));
+    let campaign = ["--axis", "x", "--part", "off", "--range=-40,40", "--max-feed", "5"];
+    printed(&[&["psec", "campaign", "--out", &psec], &campaign[..]].concat());
+    let off = ["--set", "x.feedforward.velocity=0", "--set", "x.feedforward.torque_kg_m2=0"];
+    printed(&[&["run", &psec, "--trace", &whole, "--quiet"], &off[..]].concat());
+    // The last 24 s, with the highest speeds.
+    let text = std::fs::read_to_string(&whole).expect("a trace");
+    let rows = text.lines().enumerate();
+    let kept = rows.filter(|(k, _)| *k == 0 || (k % 2 == 0 && (10_000..13_200).contains(k)));
+    let kept: Vec<&str> = kept.map(|(_, row)| row).collect();
+    std::fs::write(&thinned, kept.join("\n") + "\n").expect("a trace");
+    let guess = ["--set", "x.motor.inertia_kg_m2=0.033", "--set", "x.velocity_loop.gain=6"];
+    let identify = ["identify", &thinned, "--axis", "x", "--feedforward", "off", "--json"];
+    let found = json(&[&identify, &guess[..]].concat());
+    let values = found["values"].as_array().expect("values");
+    let truth = [("x.motor.inertia_kg_m2", 0.028), ("x.velocity_loop.gain", 5.0), ("x.friction.i0", 1.043)];
+    for (key, expected) in truth {
+        let of =
+            values.iter().find(|value| value["key"] == key).unwrap_or_else(|| panic!("{key} in {found}"));
+        let [value, error] = [&of["value"], &of["standard_error"]].map(|v| v.as_f64().expect("a number"));
+        assert!((value - expected).abs() <= 1.96 * error, "{of}");
+        assert!(error < 0.3 * value, "{of}");
+    }
+    let alpha = values.iter().find(|value| value["key"] == "x.delays.alpha_ms").expect("a delay");
+    let [low, high] = [0, 1].map(|k| alpha["interval"][k].as_f64().expect("a number"));
+    assert!(low < 9.0 && 9.0 <= high, "{alpha}");
+}

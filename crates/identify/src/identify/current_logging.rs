@@ -40,6 +40,8 @@ pub(super) struct CurrentLoggings {
     pub error: f64,
     /// True if the phase of the samples in the position cycles is known. Otherwise differences of the costs count less.
     pub is_phase_known: bool,
+    /// True if the loop is the identified one: a ripple of another size than the simulated one then leaves values in doubt.
+    pub is_of_identified_loop: bool,
 }
 
 /// Comparison of the ways in which a control can log the current.

@@ -55,7 +55,7 @@ impl LoopProblem<'_> {
             (apply(&other.axis, &other.periods, &parameters, &other.minimum.values).0, other.periods)
         });
         let alternatives = alternatives.collect();
-        let CycleMinimum { axis, periods, minimum } = best;
+        let CycleMinimum { axis, periods, minimum, .. } = best;
         let axis = &axis;
         let free = search.polish(axis, &periods, &parameters, minimum);
         // A residual below that of usual encoders outweighs the prior.

@@ -47,25 +47,28 @@ pub(super) fn possible_loggings(
         // A logger that delays the actual values by a part of a cycle leaves their phase unknown, and so do interpolated samples.
         is_phase_known: !fit.is_between_cycles()
             && !recordings.iter().any(|(signals, _)| is_between_renewals(signals)),
+        is_of_identified_loop: true,
     }
 }
 
-/// Returns `axis` with the plant that the current shows if the loop causes the ripple of the simulated `moved` axis.
+/// Returns `axis` with the plant that the current shows if the loop causes the ripple of the simulated `moved` axis, and the
+/// share of the current that remains, 1 − R².
 pub(super) fn with_plant_of_loop(
     recordings: &[(&Signals, FeedforwardMode)],
     axis: &AxisConfig,
     (moved, periods): (&AxisConfig, &Periods),
-) -> Option<AxisConfig> {
+) -> Option<(AxisConfig, f64)> {
     let loggings = CurrentLoggings {
         instants: logged_instants(recordings, &[(moved, periods)], 0.0),
         error: USUAL_RIPPLE_ERROR,
         is_phase_known: true,
+        is_of_identified_loop: false,
     };
     let signals: Vec<&Signals> = recordings.iter().map(|(signals, _)| *signals).collect();
     let plant = fit_plant(&signals, axis, Some(&loggings))?;
     let mut found = axis.clone();
     plant.apply(&mut found);
-    Some(found)
+    Some((found, 1.0 - plant.r_squared))
 }
 
 /// Returns the instants at which a control can log the current, with the ripple of the simulated axes, the identified one first,

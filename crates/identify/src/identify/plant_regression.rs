@@ -127,7 +127,21 @@ fn fit_plant_by_regression(
     let clusters: Vec<Option<usize>> = data.samples.iter().map(|sample| Some(sample.cluster)).collect();
     let residuals = |x: &[f64]| Some(data.residuals(x, &measured, (fit.noise, fit.ripple)));
     let covariance = posterior_covariance(&fit.parameters, &fit.values, residuals, &clusters, fit.noise)?;
+    if loggings.is_some_and(|loggings| loggings.is_of_identified_loop) {
+        spread = spread.map(|spread| spread + ripple_doubt(&covariance, fit.values[RIPPLE]));
+    }
     Some(PlantRegression { logging, ..result(&data, &measured, axis, &fit.values, (covariance, spread)) })
+}
+
+/// Returns the covariance of values that a ripple of another size than the simulated one leaves in doubt: their change if its
+/// `factor` was 1.
+fn ripple_doubt(covariance: &DMatrix<f64>, factor: f64) -> DMatrix<f64> {
+    let variance = covariance[(RIPPLE, RIPPLE)];
+    if !(variance > 0.0 && factor > 0.0) {
+        return DMatrix::zeros(covariance.nrows(), covariance.ncols());
+    }
+    let change = covariance.column(RIPPLE) * ((factor - 1.0) / variance);
+    &change * change.transpose()
 }
 
 /// Returns center and half width of the gravity currents that the standstills permit, A: friction holds the axis with any

@@ -13,6 +13,11 @@ pub(super) const KEPT: f64 = 1.1;
 const RENEWED: f64 = 1.5;
 /// The same up to which a cycle is compared with the plant of its ripple.
 const COMPARED: f64 = 2.0;
+/// Residual of the current relative to the least one, from which on a cycle is none of the control.
+const CURRENT: f64 = 2.0;
+/// Largest number of fits with the plant of the ripple, which depend on each other, and change of the inertia that ends them.
+const PLANT_PASSES: usize = 4;
+const SAME_INERTIA: f64 = 0.02;
 /// Position cycles that are compared, ns; the search starts with the first one that the recordings permit.
 const CYCLES: [Nanoseconds; 5] =
     [2 * MILLISECOND_NS, MILLISECOND_NS, 4 * MILLISECOND_NS, 6 * MILLISECOND_NS, MILLISECOND_NS / 2];
@@ -57,9 +62,9 @@ impl LoopProblem<'_> {
     }
 
     /// Returns the position cycle with the least residual, and the cycles with about the same residual. Residuals below the
-    /// resolution of the encoder or the error of interpolated setpoints count alike. Among cycles with about the same
-    /// residual, the renewal of the signals is preferred, then that of the machine file if it divides the lag, then the
-    /// first one.
+    /// resolution of the encoder or the error of interpolated setpoints count alike, unless the ripple of one cycle explains
+    /// the current far better. Among cycles with about the same residual, the renewal of the signals is preferred, then that
+    /// of the machine file if it divides the lag, then the first one.
     ///
     /// A motion shows β + Tsp, so the others start with β changed by the difference of the cycles. Those that can be the least
     /// are compared with the plant that the current shows with the ripple of each.
@@ -82,7 +87,7 @@ impl LoopProblem<'_> {
         });
         let mut all: Vec<CycleMinimum> = others
             .chain([(*start, first.clone())])
-            .map(|(periods, minimum)| CycleMinimum { axis: axis.clone(), periods, minimum })
+            .map(|(periods, minimum)| CycleMinimum { axis: axis.clone(), periods, minimum, current: 0.0 })
             .collect();
         let least =
             |all: &[CycleMinimum]| all.iter().map(|cycle| cycle.minimum.cost).fold(f64::INFINITY, f64::min);
@@ -100,6 +105,10 @@ impl LoopProblem<'_> {
         let renewal = self.renewal(given);
         let limit = |periods: &Periods| if Some(periods.position) == renewal { RENEWED } else { KEPT };
         all.retain(|cycle| cycle.minimum.cost <= limit(&cycle.periods).powi(2) * least);
+        let current = all.iter().map(|cycle| cycle.current).fold(f64::INFINITY, f64::min);
+        all.retain(|cycle| {
+            Some(cycle.periods.position) == renewal || cycle.current <= CURRENT * CURRENT * current
+        });
         let preference = |found: &&CycleMinimum| {
             let cycle = found.periods.position;
             let is_dividing = divides(cycle, found.minimum.values[0]);
@@ -115,13 +124,23 @@ impl LoopProblem<'_> {
         Some((best, all))
     }
 
-    /// Fits the loop of a cycle again with the plant that the current shows with its ripple.
+    /// Fits the loop of a cycle again with the plant that the current shows with its ripple, and the plant with the ripple of
+    /// that loop.
     fn refit_with_plant(&self, cycle: &mut CycleMinimum, parameters: &[LoopParameter]) {
-        let (moved, _) = apply(&cycle.axis, &cycle.periods, parameters, &cycle.minimum.values);
-        let found = with_plant_of_loop(self.recordings, &cycle.axis, (&moved, &cycle.periods));
-        let Some(axis) = found else { return };
-        if let Some(minimum) = self.converge(&axis, &cycle.periods, parameters, &cycle.minimum.values) {
+        for _ in 0..PLANT_PASSES {
+            let (moved, _) = apply(&cycle.axis, &cycle.periods, parameters, &cycle.minimum.values);
+            let found = with_plant_of_loop(self.recordings, &cycle.axis, (&moved, &cycle.periods));
+            let Some((axis, current)) = found else { return };
+            cycle.current = current;
+            let Some(minimum) = self.converge(&axis, &cycle.periods, parameters, &cycle.minimum.values)
+            else {
+                return;
+            };
+            let change = axis.motor.inertia / cycle.axis.motor.inertia - 1.0;
             (cycle.axis, cycle.minimum) = (axis, minimum);
+            if change.abs() < SAME_INERTIA {
+                return;
+            }
         }
     }
 }
@@ -133,4 +152,6 @@ pub(super) struct CycleMinimum {
     pub axis: AxisConfig,
     pub periods: Periods,
     pub minimum: LoopMinimum,
+    /// Share of the current that its plant leaves, 1 − R²; 0 without a current.
+    pub current: f64,
 }

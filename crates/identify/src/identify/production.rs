@@ -331,11 +331,13 @@ fn apply_loop(fit: &LoopFit, (before, uncertainty): (&AxisConfig, f64), found: &
         }
     }
     let inertia = fit.axis.motor.inertia;
+    // Positions show the ratio to the inertia of the current.
+    let of_inertia = found.inertia.as_ref().map_or(0.0, |inertia| inertia.error / inertia.value);
     let refined = [
-        (LoopParameter::Gain, RefinedParameter::PositionGain, 1.0),
-        (LoopParameter::Bandwidth, RefinedParameter::VelocityGain, inertia),
-        (LoopParameter::IntegralTime, RefinedParameter::VelocityIntegralTime, 1.0),
-        (LoopParameter::TorqueRatio, RefinedParameter::TorqueFeedforward, inertia),
+        (LoopParameter::Gain, RefinedParameter::PositionGain, 1.0, 0.0),
+        (LoopParameter::Bandwidth, RefinedParameter::VelocityGain, inertia, of_inertia),
+        (LoopParameter::IntegralTime, RefinedParameter::VelocityIntegralTime, 1.0, 0.0),
+        (LoopParameter::TorqueRatio, RefinedParameter::TorqueFeedforward, inertia, of_inertia),
     ];
     let weight = RefinedParameter::VelocityFeedforward;
     let gain = fit.axis.position_loop.gain;
@@ -364,13 +366,14 @@ fn apply_loop(fit: &LoopFit, (before, uncertainty): (&AxisConfig, f64), found: &
     }
     let parameters: Vec<(LoopParameter, RefinedValue)> = refined
         .into_iter()
-        .filter_map(|(parameter, refined, scale)| {
+        .filter_map(|(parameter, refined, scale, of_scale)| {
             let value = of(parameter)?;
+            let found = refined.get(&fit.axis);
             let refined = RefinedValue {
                 parameter: refined,
                 before: refined.get(before),
-                value: refined.get(&fit.axis),
-                error: value.error * scale,
+                value: found,
+                error: (value.error * scale).hypot(of_scale * found),
                 is_at_bound: false,
             };
             Some((parameter, refined))
