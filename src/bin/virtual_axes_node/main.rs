@@ -10,6 +10,8 @@ mod builtin;
 mod datagrams;
 #[cfg(target_os = "linux")]
 mod epoll_wait;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod free_memory;
 
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
@@ -20,14 +22,6 @@ use virtual_axes::validation::args::{ArgsError, Command, ParameterSource, RosArg
 use virtual_axes_core::config::{Parameters, TimeMode, ValueSource, parse_assignment};
 use virtual_axes_core::text::escaped;
 use virtual_axes_dds::{Environment, Security};
-
-/// Global allocator.
-///
-/// Messages are allocated in one thread and freed in another, in bursts: the middleware discards old samples every 6
-/// s. The allocator of the C library returns little of that memory, and a node that runs for days would hold several
-/// times what it uses.
-#[global_allocator]
-static ALLOCATOR: tikv_jemallocator::Jemalloc = tikv_jemallocator::Jemalloc;
 
 /// Number of characters of a long error that are shown from its start and from its end.
 const SHOWN_CHARACTERS: usize = 500;
@@ -100,6 +94,10 @@ fn error_line(error: &str) -> String {
 }
 
 fn run(args: &RosArgs) -> ExitCode {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    if let Err(error) = free_memory::start_return() {
+        return fail(&error);
+    }
     let environment = match Environment::from_process() {
         Ok(environment) => environment,
         Err(error) => return fail(&error),
