@@ -238,7 +238,7 @@ def test_a_step_without_a_reset_or_with_a_wrong_action_is_named(machine: va.Mach
     with pytest.raises(gymnasium.error.ResetNeeded, match="call reset first"):
         env.step(np.zeros(2))
     env.reset(seed=1)
-    with pytest.raises(gymnasium.error.InvalidAction, match=r"shape \(1, 3\); it needs \(1, 2\)"):
+    with pytest.raises(gymnasium.error.InvalidAction, match=r"shape \(3,\); it needs \(2,\)"):
         env.step(np.zeros(3))
     for value in (1.5, -3.0, np.nan):
         with pytest.raises(gymnasium.error.InvalidAction, match=rf"value {value:g}; it must be within ±1"):

@@ -203,8 +203,10 @@ class _Fleet:
         if not self._psec.shape[1]:
             raise gymnasium.error.ResetNeeded("the environment has no motion yet; call reset first")
         shape = (self._shape[0], len(self._columns))
-        if np.shape(actions) != shape:
-            raise gymnasium.error.InvalidAction(f"the action has the shape {np.shape(actions)}; it needs {shape}")
+        if (found := np.shape(actions)) != shape:
+            # Of one machine without the dimension that the environment has added.
+            first = 1 if found[:1] == (1,) and shape[0] == 1 else 0
+            raise gymnasium.error.InvalidAction(f"the action has the shape {found[first:]}; it needs {shape[first:]}")
         if not np.all(np.abs(actions) <= 1 + ROUNDING):
             worst = float(np.asarray(actions).flat[int(np.argmax(np.abs(actions)))])
             raise gymnasium.error.InvalidAction(

@@ -20,9 +20,9 @@ from .run import embedded_page
 from .tables import columns_of, numbers
 
 if TYPE_CHECKING:
-    from .tables import Table
+    from .machine import Columns
 
-    Recording = str | os.PathLike[str] | Mapping[str, ArrayLike] | Table
+    Recording = str | os.PathLike[str] | Columns
     Feedforward = Literal["off", "velocity", "both"]
     Source = str | dict[str, NDArray[np.float64]] | tuple[list[str], list[NDArray[np.float64]]]
 

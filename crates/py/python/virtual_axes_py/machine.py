@@ -15,10 +15,12 @@ from .run import Run
 from .tables import TIME, axis_columns, axis_values, named_table
 
 if TYPE_CHECKING:
-    from .tables import Table
+    from .tables import LazyTable, Table
 
-    Setpoints = NDArray[np.float64] | Mapping[str, ArrayLike] | Table | _native.Scenario | _native.PartProgram
-    Loads = ArrayLike | Mapping[str, ArrayLike] | Table
+    Columns = Mapping[str, ArrayLike] | Table | LazyTable
+    Setpoints = NDArray[np.float64] | Columns | _native.Scenario | _native.PartProgram
+    Loads = ArrayLike | Columns
+    AxisValues = ArrayLike | Mapping[str, ArrayLike]
     Parameter = bool | int | float | str | Sequence[bool] | Sequence[int] | Sequence[float] | Sequence[str]
 
 SIGNALS = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +12,9 @@ from . import _native
 from .arguments import to_floats, to_native, to_whole
 from .machine import Machine
 from .tables import axis_values
+
+if TYPE_CHECKING:
+    from .machine import AxisValues
 
 
 class Stepper:
@@ -53,7 +57,7 @@ class Stepper:
         """Returns axes, number of machines and time."""
         return f"Stepper(axes {', '.join(self._axes)}; {self.machines} machines; {self.time:.6g} s)"
 
-    def step(self, psec: ArrayLike, preview: ArrayLike | None = None) -> NDArray[np.float64]:
+    def step(self, psec: AxisValues, preview: ArrayLike | None = None) -> NDArray[np.float64]:
         """Advances by one position cycle and returns the positions at its end, m or rad.
 
         `psec` are the setpoints of the cycle, m or rad. `preview` are the following setpoints, (axes, cycles) or of
@@ -63,7 +67,7 @@ class Stepper:
         ahead = None if preview is None else to_floats("preview", preview)
         return self._native.step(axis_values(self._axes, "psec", psec), ahead)
 
-    def reset(self, position: ArrayLike | None = None, *, only: Sequence[int] | None = None) -> None:
+    def reset(self, position: AxisValues | None = None, *, only: Sequence[int] | None = None) -> None:
         """Puts the axes at rest at `position`, m or rad (default 0), at time 0.
 
         `only` are the indices of the machines to reset, at their rows of `position`; the time goes on then. Raises
@@ -73,11 +77,11 @@ class Stepper:
         last = self.machines - 1
         self._native.reset(given, None if only is None else [to_whole("machine", one, 0, last) for one in only])
 
-    def set_load(self, load: ArrayLike) -> None:
+    def set_load(self, load: AxisValues) -> None:
         """Sets the external loads from the next cycle on, N or N·m, positive towards plus; 0 for axes without one."""
         self._native.set_load(axis_values(self._axes, "load", load, 0.0))
 
-    def set_velocity_offset(self, offset: ArrayLike) -> None:
+    def set_velocity_offset(self, offset: AxisValues) -> None:
         """Sets offsets that are added to the outputs Ω* of the position controllers from the next cycle on.
 
         They are in rad/s of the motor (m/s of a linear motor) and 0 after a reset. The controllers see the sum, within

@@ -28,6 +28,16 @@ class Table(Protocol):
         """Returns the number of rows or columns."""
 
 
+class LazyTable(Protocol):
+    """Table that is computed when it is read: a LazyFrame of polars."""
+
+    def collect(self) -> Any:
+        """Returns the table."""
+
+    def collect_schema(self) -> Any:
+        """Returns names and types of the columns."""
+
+
 def columns_of(name: str, given: Any, *, skip_texts: bool = False) -> dict[str, NDArray[np.float64]] | None:
     """Returns the columns of a table by name; None for anything without names, as an array.
 
