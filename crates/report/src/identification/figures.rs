@@ -12,7 +12,7 @@ use virtual_axes_identify::identify::{
 };
 use virtual_axes_identify::recording::Severity;
 
-use super::page::counted;
+use super::page::{counted, exponent_unit};
 use crate::text::{NONE, digits};
 use crate::{DisplayUnit, Table};
 
@@ -174,9 +174,18 @@ pub fn friction(friction: &FrictionSummary) -> String {
 }
 
 /// Lists the friction laws of both directions and of each.
-pub fn friction_laws(friction: &FrictionSummary) -> Table {
+pub fn friction_laws(friction: &FrictionSummary, speed_unit: &str) -> Table {
     let line = [("law", ""), ("level", "A"), ("slope", "A per unit of V"), ("R²", "")];
-    let exponential = [("law", ""), ("a", "A"), ("b", ""), ("c", "A"), ("d", ""), ("i0", "A"), ("R²", "")];
+    let exponent_unit = exponent_unit(speed_unit);
+    let exponential = [
+        ("law", ""),
+        ("a", "A"),
+        ("b", exponent_unit),
+        ("c", "A"),
+        ("d", exponent_unit),
+        ("i0", "A"),
+        ("R²", ""),
+    ];
     let is_line = friction.law.law == FrictionLaw::Linear;
     let mut laws = Table::new("Friction laws", if is_line { &line } else { &exponential });
     let row = |name: &str, law: &LawSummary| {

@@ -46,7 +46,7 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         let law = describe(page, &page.axis().friction);
         section.paragraphs.push(format!("The refinement in closed loop changes it to {law}."));
     }
-    section.tables.push(figures::friction_laws(figures));
+    section.tables.push(figures::friction_laws(figures, summary.speed_unit));
     if found.steady.levels.is_empty() {
         let now = drive::Friction::new(page.axis().friction, page.kind(), 1.0, 1.0);
         let points = friction_points(page.found, |v| now.bound(v).copysign(v));

@@ -61,11 +61,13 @@ impl IdentificationPage<'_> {
     }
 
     pub(super) fn exponent_unit(&self) -> &'static str {
-        match self.kind() {
-            AxisKind::Linear => "min/m",
-            AxisKind::Rotary => "min/rev",
-        }
+        exponent_unit(self.axis().units().speed_name)
     }
+}
+
+/// Returns the unit of the exponents b and d of a friction law over a speed.
+pub(super) fn exponent_unit(speed_unit: &str) -> &'static str {
+    if speed_unit == "rpm" { "min/rev" } else { "min/m" }
 }
 
 /// Converts a finding with its remedy to a notice.

@@ -20,7 +20,7 @@ pub fn text(found: &IdentificationSummary) -> String {
     parts.extend(found.friction.as_ref().map(|friction| {
         let currents = figures::friction_currents(friction, found.speed_unit);
         let currents = if currents.rows.is_empty() { String::new() } else { text_table::text(&currents) };
-        let laws = text_table::text(&figures::friction_laws(friction));
+        let laws = text_table::text(&figures::friction_laws(friction, found.speed_unit));
         format!("{}{laws}\n{currents}", text_table::wrapped_line(&figures::friction(friction)))
     }));
     parts.push(lines(figures::steps(found)));
