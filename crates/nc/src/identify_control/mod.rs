@@ -36,6 +36,7 @@ use self::axis_motions::AxisMotions;
 use self::blocks::identify_blocks;
 use self::corner_rule::identify_corners;
 use self::law::Smoothing;
+use self::rest_deviation::{RestDeviation, without_scales};
 use self::standstill::{identify_ends, identify_wait};
 use self::track::{Track, motions};
 use crate::motion::ProgramStep;
@@ -50,11 +51,15 @@ pub fn identify_control<E: std::fmt::Display>(
     machine: &MachineConfig,
     log: &ControlLog,
 ) -> Result<ControlIdentification, String> {
-    let track = Track::new(log, motions(steps)?)?;
+    let motions = motions(steps)?;
+    let deviations = Track::new(log, motions.clone())?.rest_deviations();
+    let corrected = without_scales(log, &deviations);
+    let log = corrected.as_ref().unwrap_or(log);
+    let track = Track::new(log, motions)?;
     let mut found =
         ControlIdentification { motions: track.motions.len(), ..ControlIdentification::default() };
     found.motion_time = motion_time(&track);
-    found.warnings.extend(track.warnings.iter().cloned());
+    found.warnings.extend(deviations.iter().map(RestDeviation::warning));
     let axes = AxisMotions::new(machine, &track);
     found.warnings.extend(axes.feed_warning(&track));
     axes.identify(&mut found);
@@ -253,17 +258,18 @@ mod tests {
     }
 
     #[test]
-    fn a_scaled_axis_is_named_and_keeps_its_accelerations() {
+    fn a_scaled_axis_is_named_and_intervals_contain_the_accelerations() {
         let probe = Probe::new();
         let mut rows = probe.rows(|k| 1e-3 * k as f64, 1.0);
         rows.iter_mut().for_each(|(_, row)| row[1] *= 1.0003);
         let (found, _) = probe.identified(&rows, 1e-9).unwrap();
         let [warning] = found.warnings.as_slice() else { panic!("{:?}", found.warnings) };
-        assert!(warning.starts_with("Y rests up to") && warning.contains("scale of 1.0003"), "{warning}");
+        assert!(warning.starts_with("Y moves 1.000300 times as far"), "{warning}");
         for axis in ["x", "y", "z"] {
             let key = format!("{axis}.limits.acceleration_m_s2");
             let value = found.values.iter().find(|value| value.key == key).expect("an acceleration");
-            assert!((value.value / 4.0 - 1.0).abs() < 5e-4, "{value:?}");
+            let error = (value.value - 4.0).abs();
+            assert!(error <= value.half_width && error < 5e-4, "{value:?}");
         }
     }
 

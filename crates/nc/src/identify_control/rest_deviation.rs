@@ -2,6 +2,7 @@
 
 use virtual_axes_core::units::Rounded;
 
+use super::log::ControlLog;
 use super::track::{Track, TrackedMotion, distance};
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates, is_rotary};
 
@@ -12,29 +13,61 @@ const MOST_DISTANCE: f64 = 1e-3;
 /// Part of the largest deviation up to which a scale leaves deviations.
 const LEFT_BY_SCALE: f64 = 0.1;
 
+/// Deviation of the rests of an axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RestDeviation {
+    axis: usize,
+    /// Largest deviation, m or rad.
+    largest: f64,
+    /// Scale and offset of the positions, m or rad, that explain the deviations.
+    scale: Option<[f64; 2]>,
+}
+
+impl RestDeviation {
+    /// Returns what the deviation means for the values.
+    pub fn warning(&self) -> String {
+        let (size, unit) = if is_rotary(self.axis) { (1f64.to_radians(), "deg") } else { (1e-6, "µm") };
+        let letter = AXIS_LETTERS[self.axis];
+        let largest = Rounded(self.largest / size);
+        match self.scale {
+            Some([scale, _]) => format!(
+                "{letter} moves {scale:.6} times as far as in the program, and rests up to {largest} {unit} beside the ends of \
+                 motions: its positions are divided by this scale"
+            ),
+            None => format!(
+                "{letter} rests up to {largest} {unit} beside the ends of motions, so that motions do not count: record setpoints \
+                 before compensations"
+            ),
+        }
+    }
+}
+
+/// Returns the log without the scales of deviations; `None` if none has a scale.
+pub(super) fn without_scales(log: &ControlLog, deviations: &[RestDeviation]) -> Option<ControlLog> {
+    deviations.iter().any(|deviation| deviation.scale.is_some()).then(|| {
+        let mut log = log.clone();
+        for RestDeviation { axis, scale, .. } in deviations {
+            let Some([scale, offset]) = scale else { continue };
+            log.positions.iter_mut().for_each(|at| at[*axis] = (at[*axis] - offset) / scale);
+        }
+        log
+    })
+}
+
 impl Track<'_> {
-    /// Allows for rests that are off the ends of motions by more than digits.
-    pub(super) fn allow_rest_deviation(&mut self) {
+    /// Returns the axes whose rests are off the ends of motions by more than digits.
+    pub(super) fn rest_deviations(&self) -> Vec<RestDeviation> {
+        if self.log.accuracy.is_estimated() {
+            return Vec::new();
+        }
         let rests = self.rests_beside_ends();
-        let largest =
-            |axis: usize| rests.iter().map(|[at, end]| (at[axis] - end[axis]).abs()).fold(0.0, f64::max);
-        let most = rests.iter().map(|[at, end]| distance(at, end)).fold(0.0, f64::max);
-        if most <= self.rest_tolerance {
-            return;
-        }
-        for axis in (0..AXIS_COUNT).filter(|&axis| largest(axis) > self.rest_tolerance) {
-            let (size, unit) = if is_rotary(axis) { (1f64.to_radians(), "deg") } else { (1e-6, "µm") };
-            let scale =
-                scale(rests.iter().map(|[at, end]| [end[axis], at[axis]]), LEFT_BY_SCALE * largest(axis));
-            let scale = scale.map_or_else(String::new, |scale| format!(", as with a scale of {scale:.6}"));
-            self.warnings.push(format!(
-                "{} rests up to {} {unit} beside the ends of motions{scale}: record setpoints before compensations, or use the \
-                 program with this scale",
-                AXIS_LETTERS[axis],
-                Rounded(largest(axis) / size)
-            ));
-        }
-        self.rest_tolerance += most;
+        let of = |axis: usize| {
+            let pairs = rests.iter().map(|[at, end]| [end[axis], at[axis]]);
+            let largest = pairs.clone().map(|[end, at]| (at - end).abs()).fold(0.0, f64::max);
+            let scale = scale(pairs, LEFT_BY_SCALE * largest);
+            (largest > self.rest_tolerance()).then_some(RestDeviation { axis, largest, scale })
+        };
+        (0..AXIS_COUNT).filter_map(of).collect()
     }
 
     /// Returns the position of each rest, and the end of a motion beside it.
@@ -59,9 +92,9 @@ impl Track<'_> {
     }
 }
 
-/// Returns the scale that leaves at most these deviations of positions from those of the program, given as pairs of
+/// Returns scale and offset that leave at most these deviations of positions from those of the program, given as pairs of
 /// positions of the program and of the log.
-fn scale(pairs: impl Iterator<Item = [f64; 2]> + Clone, most: f64) -> Option<f64> {
+fn scale(pairs: impl Iterator<Item = [f64; 2]> + Clone, most: f64) -> Option<[f64; 2]> {
     let count = pairs.clone().count() as f64;
     let mean = |index: usize| pairs.clone().map(|pair| pair[index]).sum::<f64>() / count;
     let means = [mean(0), mean(1)];
@@ -69,6 +102,7 @@ fn scale(pairs: impl Iterator<Item = [f64; 2]> + Clone, most: f64) -> Option<f64
         pairs.clone().map(|pair| (pair[0] - means[0]) * (pair[index] - means[index])).sum::<f64>()
     };
     let scale = products(1) / products(0);
-    let left = pairs.clone().map(|[end, at]| (at - means[1] - scale * (end - means[0])).abs());
-    (left.fold(0.0, f64::max) <= most).then_some(scale)
+    let offset = means[1] - scale * means[0];
+    let left = pairs.clone().map(|[end, at]| (at - offset - scale * end).abs());
+    (left.fold(0.0, f64::max) <= most && scale.is_finite()).then_some([scale, offset])
 }

@@ -167,10 +167,6 @@ pub(super) struct Track<'a> {
     pub samples: Vec<[usize; 2]>,
     /// True if the axes do not move from this sample to the next one.
     pub is_at_rest: Vec<bool>,
-    /// Largest distance of a rest from the end of its motion, m.
-    pub rest_tolerance: f64,
-    /// Warnings of what makes values of the log wrong.
-    pub warnings: Vec<String>,
 }
 
 /// Returns the motions of a program.
@@ -282,12 +278,12 @@ impl<'a> Track<'a> {
         let ends = std::iter::repeat_n(true, window);
         let is_at_rest =
             log.positions.windows(window + 1).map(at_rest).chain(ends).take(log.positions.len()).collect();
-        let rest_tolerance = 1e-7 + 4.0 * resolution;
-        let mut track = Self { log, motions, samples, is_at_rest, rest_tolerance, warnings: Vec::new() };
-        if !log.accuracy.is_estimated() {
-            track.allow_rest_deviation();
-        }
-        Ok(track)
+        Ok(Self { log, motions, samples, is_at_rest })
+    }
+
+    /// Returns the largest distance of a rest from the end of its motion, m.
+    pub fn rest_tolerance(&self) -> f64 {
+        1e-7 + 4.0 * self.log.accuracy.resolution
     }
 
     /// Returns the samples from the last one at rest before a motion to the first one at rest behind it; `None` where the
@@ -303,7 +299,7 @@ impl<'a> Track<'a> {
                 && self.is_at_rest[sample]
         };
         let near = |sample: usize, point: &Coordinates| {
-            distance(&self.log.positions[sample], point) <= self.rest_tolerance
+            distance(&self.log.positions[sample], point) <= self.rest_tolerance()
         };
         let TrackedMotion { from, to, .. } = &self.motions[motion];
         let before = (first.saturating_sub(reach)..=first + reach)
