@@ -30,9 +30,10 @@ impl RestDeviation {
         let letter = AXIS_LETTERS[self.axis];
         let largest = Rounded(self.largest / size);
         match self.scale {
-            Some([scale, _]) => format!(
-                "{letter} moves {scale:.6} times as far as in the program, and rests up to {largest} {unit} beside the ends of \
-                 motions: its positions are divided by this scale"
+            Some([scale, offset]) => format!(
+                "{letter} rests up to {largest} {unit} beside the ends of motions, at {scale:.6} times the positions of the program \
+                 plus {:.3} {unit}: its positions are corrected",
+                offset / size
             ),
             None => format!(
                 "{letter} rests up to {largest} {unit} beside the ends of motions, so that motions do not count: record setpoints \
