@@ -99,7 +99,7 @@ rust_checks() {
   # The tests with sanitizers are marked as ignored.
   local ignored=
   [ $mode = all ] && ignored=--include-ignored
-  lints && stage "cargo test" cargo test --release --workspace --locked --no-fail-fast -- $ignored || return
+  stage "cargo test" cargo test --release --workspace --locked --no-fail-fast -- $ignored || return
   [ $mode = all ] || return 0
   stage "cargo doc" env RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --locked &&
     stage "short runs of the fuzz targets" tools/fuzz.sh short
@@ -140,6 +140,8 @@ if [ $mode = all ]; then
 fi
 stage "cargo build" cargo build --release --workspace --locked || finish 1
 stage "reference" tools/reference.py || finish 1
+# Before the rclpy tests, some of which call cargo and would wait for its lock.
+lints || finish 1
 join_background set_up
 stage "ruff" bash -c ".venv/bin/ruff format --check && .venv/bin/ruff check" || finish 1
 if [ $mode = all ]; then

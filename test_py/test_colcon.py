@@ -49,7 +49,8 @@ class Workspace:
         # Set by ros_wheels_bootstrapper, which then no longer adds the wheels' libraries to LD_LIBRARY_PATH.
         environment.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)
         command = [PREFIX / "bin" / "colcon", "--log-base", "log", verb, "--paths", self.source, *words]
-        return subprocess.run(command, cwd=self.folder, env=environment, capture_output=True, text=True, timeout=240)
+        # cargo may wait until the Rust tests are compiled, which happens beside these tests.
+        return subprocess.run(command, cwd=self.folder, env=environment, capture_output=True, text=True, timeout=1200)
 
     def build(self, *definitions: str) -> subprocess.CompletedProcess[str]:
         """Builds the package as the README has it, plus definitions of CMake."""
