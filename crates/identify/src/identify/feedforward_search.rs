@@ -18,6 +18,8 @@ const CLEAR: f64 = 1.5;
 const ALIKE: f64 = 1.1;
 /// Standard errors of a value within its interval.
 const INTERVAL: f64 = 1.96;
+/// Factor on the position-loop gain of the machine file beyond which a mode is implausible.
+const IMPLAUSIBLE: f64 = 3.0;
 /// Ratio of the residual of a search to the least one up to which it can end in a local minimum that is followed further.
 const COMPARED: f64 = 2.0;
 
@@ -35,6 +37,16 @@ struct TriedMode {
     minimum: LoopMinimum,
     /// RMS residual, m or rad.
     rms: f64,
+    /// Position-loop gain, and that of the machine file, s⁻¹.
+    gain: f64,
+    given_gain: f64,
+}
+
+impl TriedMode {
+    /// Returns true if the position-loop gain is about that of the machine file.
+    fn is_plausible(&self) -> bool {
+        (self.given_gain / IMPLAUSIBLE..=self.given_gain * IMPLAUSIBLE).contains(&self.gain)
+    }
 }
 
 impl FeedforwardSearch {
@@ -54,10 +66,12 @@ impl FeedforwardSearch {
         search
     }
 
-    /// Takes, of the modes that explain the motion alike, the one with the least feedforward.
+    /// Takes, of the modes that explain the motion alike, a plausible one, and of these the one with the least feedforward.
     fn select(&mut self) {
         let least = self.least();
-        if let Some(tried) = self.tried.iter().find(|tried| tried.rms <= ALIKE * least) {
+        let mut alike = self.tried.iter().filter(|tried| tried.rms <= ALIKE * least);
+        let first = alike.clone().next();
+        if let Some(tried) = alike.find(|tried| tried.is_plausible()).or(first) {
             self.mode = tried.mode;
         }
     }
@@ -80,7 +94,8 @@ impl FeedforwardSearch {
         let mut found = Vec::new();
         for tried in self.tried.iter_mut().filter(|tried| tried.rms <= CLEAR * least) {
             if let Some(identified) = fit(tried.mode, Some(tried.minimum.clone())) {
-                tried.rms = identified.0.rms;
+                tried.rms = identified.0.exact_rms;
+                tried.gain = identified.0.axis.position_loop.gain;
                 found.push((tried.mode, identified));
             }
         }
@@ -92,7 +107,7 @@ impl FeedforwardSearch {
         };
         if let Some((fit, Some(plant))) = &mut identified {
             // The interval contains the inertia of a mode that explains the motion alike.
-            let alike = found.iter().filter(|(_, (other, _))| other.rms <= ALIKE * fit.rms);
+            let alike = found.iter().filter(|(_, (other, _))| other.exact_rms <= ALIKE * fit.exact_rms);
             for (_, (_, other)) in alike {
                 let change = other.as_ref().map_or(0.0, |other| other.inertia.value - plant.inertia.value);
                 plant.inertia.error = plant.inertia.error.hypot(change / INTERVAL);
@@ -112,6 +127,7 @@ impl FeedforwardSearch {
         let residuals = self.tried.iter().map(residual).collect::<Vec<String>>().join(", ");
         let least = |is_off: bool| {
             let of_it = self.tried.iter().filter(|tried| (tried.mode == FeedforwardMode::Off) == is_off);
+            let of_it = of_it.filter(|tried| tried.is_plausible() || tried.mode == self.mode);
             of_it.map(|tried| tried.rms).fold(f64::INFINITY, f64::min)
         };
         let (off, on) = (least(true), least(false));
@@ -149,15 +165,32 @@ fn tried_modes(
         let minimum = mean_lag(&recordings, axis).and_then(|lag| problem.search(axis, periods, lag));
         let Some(minimum) = minimum else { continue };
         let Some(rms) = problem.searched_rms(axis, periods, &minimum) else { continue };
-        tried.push(TriedMode { mode, minimum, rms });
+        let (gain, given_gain) = (problem.gain_of(axis, &minimum), problem.given_gain);
+        tried.push(TriedMode { mode, minimum, rms, gain, given_gain });
     }
     let least = tried.iter().map(|tried| tried.rms).fold(f64::INFINITY, f64::min);
+    let mut without_torque = Vec::new();
     for tried in tried.iter_mut().filter(|tried| tried.rms <= COMPARED * least) {
         let recordings = [(input.signals, tried.mode)];
         let problem = LoopProblem { recordings: &recordings, ..problem };
-        let Some(minimum) = problem.polished(axis, periods, tried.minimum.clone()) else { continue };
-        tried.rms *= (minimum.cost / tried.minimum.cost).sqrt();
-        tried.minimum = minimum;
+        let mut starts = vec![tried.minimum.clone()];
+        // A search over all parameters can miss the minimum without torque feedforward.
+        starts.extend(match tried.mode {
+            FeedforwardMode::Both => problem.with_torque(axis, periods, &without_torque),
+            FeedforwardMode::Off | FeedforwardMode::Velocity => None,
+        });
+        for start in starts {
+            let Some(minimum) = problem.polished(axis, periods, start) else { continue };
+            let Some(rms) = problem.searched_rms(axis, periods, &minimum) else { continue };
+            if rms < tried.rms {
+                tried.gain = problem.gain_of(axis, &minimum);
+                (tried.minimum, tried.rms) = (minimum, rms);
+            }
+        }
+        if tried.mode == FeedforwardMode::Velocity {
+            let values = tried.minimum.values.iter().copied();
+            without_torque = problem.parameters(axis).into_iter().zip(values).collect();
+        }
     }
     tried
 }

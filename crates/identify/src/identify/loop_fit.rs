@@ -13,10 +13,16 @@ use super::loop_search::LoopMinimum;
 use super::loop_values::{LoopFit, LoopValue};
 use super::position_cycles::{CycleMinimum, KEPT};
 use virtual_axes_core::config::{AxisConfig, Periods};
+use virtual_axes_core::statistics::rms;
 use virtual_axes_core::units::seconds;
 
 /// Longest duration of a recording for the search, s.
 const SEARCHED: f64 = 6.0;
+/// Largest number of passes with the noise of the residual before, and its change that ends them.
+const NOISE_PASSES: usize = 6;
+const SAME_NOISE: f64 = 0.8;
+/// TFFW / Jeq from which the fit with torque feedforward starts at the minimum without it.
+const TORQUE_START: f64 = 0.5;
 
 impl LoopProblem<'_> {
     /// Returns the problem of a part of long recordings, for the search.
@@ -30,17 +36,61 @@ impl LoopProblem<'_> {
         self.searched().best(axis, self.cycles(given).first()?, &self.parameters(axis), lag)
     }
 
-    /// Follows the minimum `from` of a search, whose delays can be those of a local one.
+    /// Follows the minimum `from` of a search, whose delays can be those of a local one and whose prior can outweigh the
+    /// motion.
     pub fn polished(&self, axis: &AxisConfig, given: &Periods, from: LoopMinimum) -> Option<LoopMinimum> {
-        Some(self.searched().polish(axis, self.cycles(given).first()?, &self.parameters(axis), from))
+        let (search, parameters, cycles) = (self.searched(), self.parameters(axis), self.cycles(given));
+        let from = search.polish(axis, cycles.first()?, &parameters, from);
+        Some(search.with_noise_of(axis, cycles.first()?, &parameters, from)?.1)
     }
 
     /// Returns the RMS residual of a minimum of the search, m or rad.
     pub fn searched_rms(&self, axis: &AxisConfig, given: &Periods, found: &LoopMinimum) -> Option<f64> {
         let (search, parameters) = (self.searched(), self.parameters(axis));
-        let count =
-            search.residuals(axis, self.cycles(given).first()?, &parameters, &found.values)?.len().max(1);
-        Some((found.cost / count as f64).sqrt())
+        let left = search.residuals(axis, self.cycles(given).first()?, &parameters, &found.values)?;
+        let data = left.len().saturating_sub(parameters.len());
+        rms(left.iter().take(data).copied())
+    }
+
+    /// Returns the minimum with torque feedforward next to the minimum `from` without it.
+    pub fn with_torque(
+        &self,
+        axis: &AxisConfig,
+        given: &Periods,
+        from: &[(LoopParameter, f64)],
+    ) -> Option<LoopMinimum> {
+        let (search, parameters, cycles) = (self.searched(), self.parameters(axis), self.cycles(given));
+        let of =
+            |wanted: LoopParameter| from.iter().find(|(known, _)| *known == wanted).map(|(_, value)| *value);
+        let start = parameters.iter().map(|parameter| match parameter {
+            LoopParameter::Gamma => of(LoopParameter::Beta),
+            LoopParameter::TorqueRatio => Some(TORQUE_START),
+            other => of(*other),
+        });
+        let start = start.collect::<Option<Vec<f64>>>()?;
+        search.converge(axis, cycles.first()?, &parameters, &start)
+    }
+
+    /// Follows the minimum `from` with the noise of its residual, until the noise stays: a residual below that of usual
+    /// encoders outweighs the prior. Returns the problem with that noise.
+    fn with_noise_of(
+        &self,
+        axis: &AxisConfig,
+        periods: &Periods,
+        parameters: &[LoopParameter],
+        mut from: LoopMinimum,
+    ) -> Option<(Self, LoopMinimum)> {
+        let mut problem = *self;
+        for _ in 0..NOISE_PASSES {
+            let noise = problem.correlated_noise(axis, periods, parameters, &from.values)?;
+            if noise > SAME_NOISE * problem.noise {
+                break;
+            }
+            problem.noise = noise;
+            from = problem.converge(axis, periods, parameters, &from.values)?;
+            from = problem.polish(axis, periods, parameters, from);
+        }
+        Some((problem, from))
     }
 
     /// Fits delays, gains and weights from the minimum `first` of a search.
@@ -48,7 +98,7 @@ impl LoopProblem<'_> {
         let parameters = self.parameters(axis);
         let cycles = self.cycles(given);
         // Long recordings are searched in part only.
-        let search = self.searched();
+        let (search, first) = self.searched().with_noise_of(axis, cycles.first()?, &parameters, first)?;
         let (best, all) = search.best_cycle((axis, given), &cycles, &parameters, first)?;
         let others = all.iter().filter(|other| other.periods.position != best.periods.position);
         let alternatives = others.map(|other| {
@@ -93,8 +143,8 @@ impl LoopProblem<'_> {
             between.position_loop.gain = gain;
             between.feedforward.velocity -= (free.values[0] - cycles * tsp) * gain;
         }
-        let (fixed, _) = apply(&between, periods, &[LoopParameter::Lag], &[cycles * tsp]);
         let pairs = parameters.iter().copied().zip(free.values.iter().copied());
+        let (fixed, _) = apply(&between, periods, &[LoopParameter::Lag], &[cycles * tsp]);
         let (others, from): (Vec<LoopParameter>, Vec<f64>) =
             pairs.clone().filter(|(parameter, _)| is_rounded(*parameter, is_between)).unzip();
         let last = self.converge(&fixed, periods, &others, &from)?;
@@ -114,6 +164,8 @@ impl LoopProblem<'_> {
                 covariance[(j, k)] / (errors[j] * errors[k])
             }),
             rms: (last.cost / count).sqrt(),
+            exact_rms: (free.cost / count).sqrt(),
+            exact_axis: apply(axis, periods, &parameters, &free.values).0,
             rms_with_given_gain: rms_with_given_gain.map(|cost| (cost / count).sqrt()),
             alternatives: Vec::new(),
             valley: self.valley(&found, periods, free.values[0]),
@@ -129,7 +181,9 @@ impl LoopProblem<'_> {
         let values = known.values.iter().filter(|value| is_rounded(value.parameter, is_between));
         let (parameters, from): (Vec<LoopParameter>, Vec<f64>) =
             values.map(|value| (value.parameter, value.value)).unzip();
-        let found = self.converge(axis, &known.periods, &parameters, &from)?;
+        let noise = self.correlated_noise(axis, &known.periods, &parameters, &from)?;
+        let problem = LoopProblem { noise: noise.min(self.noise), ..*self };
+        let found = problem.converge(axis, &known.periods, &parameters, &from)?;
         let count = self.residuals(axis, &known.periods, &parameters, &found.values)?.len().max(1);
         let mut fit = known.clone();
         for (parameter, value) in parameters.iter().zip(&found.values) {

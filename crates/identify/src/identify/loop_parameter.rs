@@ -11,7 +11,7 @@ const BANDWIDTH: f64 = 240.0;
 /// Parameter of the fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum LoopParameter {
-    /// Lag of the position at constant velocity, s: shift of the commanded position.
+    /// Lag of the position at constant velocity, s: α, and the time by which the control logs actual values late.
     Lag,
     /// β, s.
     Beta,
@@ -27,7 +27,7 @@ pub(super) enum LoopParameter {
     TorqueRatio,
 }
 
-/// Returns the axis with `values`, and the shift of the commanded position, s.
+/// Returns the axis with `values`, and the time by which actual values are logged late, s: the lag without whole cycles.
 pub(super) fn apply(
     axis: &AxisConfig,
     periods: &Periods,
@@ -47,7 +47,7 @@ pub(super) fn apply(
     for (parameter, &value) in parameters.iter().zip(values) {
         match parameter {
             LoopParameter::Lag => {}
-            // The shift delays the feedforward too.
+            // Actual values that are logged late show the feedforward late too.
             LoopParameter::Beta => axis.delays.beta = nanoseconds((value - shift).max(0.0)),
             LoopParameter::Gamma => axis.delays.gamma = nanoseconds((value - shift).max(0.0)),
             LoopParameter::Gain => axis.position_loop.gain = value,

@@ -1,6 +1,6 @@
 //! Residuals of the positions of a closed loop over delays, gains and feedforward weights.
 //!
-//! A shift of the commanded position makes α continuous.
+//! Actual values that are logged late make the lag continuous.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -12,6 +12,7 @@ use super::experiment::{CurrentLogging, Experiment};
 use super::feedforward_mode::FeedforwardMode;
 use super::fit::BoundedParameter;
 use super::loop_parameter::{LoopParameter, apply, prior};
+use super::loop_search::LoopMinimum;
 use super::resample::interpolation_error;
 use super::trace_experiments::trace_experiments;
 use crate::recording::Signals;
@@ -22,7 +23,7 @@ use virtual_axes_core::units::{Nanoseconds, POSITION_GAIN, seconds};
 /// Longest delay, s.
 pub(super) const LONGEST: f64 = 0.1;
 /// Longest difference of the lag from a whole number of position cycles, s.
-const GRID_TOLERANCE: f64 = 0.1e-3;
+pub(super) const GRID_TOLERANCE: f64 = 0.1e-3;
 /// Relative tolerance of the longest position cycle.
 pub(super) const PERMITTED: f64 = 1e-3;
 /// Least step of an encoder, m or rad, above the rounding of positions; ratio of a difference to it up to which the
@@ -96,6 +97,13 @@ impl LoopProblem<'_> {
         }
         parameters.extend([LoopParameter::Bandwidth, LoopParameter::IntegralTime]);
         parameters
+    }
+
+    /// Returns the position-loop gain of a minimum, s⁻¹; that of `axis` if it is not fitted.
+    pub fn gain_of(&self, axis: &AxisConfig, minimum: &LoopMinimum) -> f64 {
+        let parameters = self.parameters(axis);
+        let gain = parameters.iter().zip(&minimum.values).find(|(p, _)| **p == LoopParameter::Gain);
+        gain.map_or(axis.position_loop.gain, |(_, gain)| *gain)
     }
 
     pub fn residuals(

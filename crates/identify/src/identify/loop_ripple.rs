@@ -34,7 +34,7 @@ pub(super) fn possible_loggings(
 ) -> CurrentLoggings {
     let others = fit.alternatives.iter().map(|(axis, periods)| (axis, periods));
     let cycles: Vec<(&AxisConfig, &Periods)> =
-        std::iter::once((&fit.axis, &fit.periods)).chain(others).collect();
+        std::iter::once((&fit.exact_axis, &fit.periods)).chain(others).collect();
     let of = |parameter: LoopParameter| fit.values.iter().find(|value| value.parameter == parameter);
     // The velocity feedforward steps once β has passed, within a position cycle.
     let tsv = seconds(fit.periods.velocity);

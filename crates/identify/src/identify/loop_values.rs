@@ -24,6 +24,9 @@ pub(super) struct LoopFit {
     pub values: Vec<LoopValue>,
     /// RMS position residual, m or rad.
     pub rms: f64,
+    /// The same with a lag that need not be a whole number of cycles: of a control that logs actual values late.
+    pub exact_rms: f64,
+    pub exact_axis: AxisConfig,
     /// Correlations of the fitted values, in their order.
     pub correlations: DMatrix<f64>,
     /// RMS position residual with the gain of the machine file, if the gain was fitted.

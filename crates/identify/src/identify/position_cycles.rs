@@ -1,7 +1,7 @@
 //! Position cycles that recordings permit, compared by the residuals of the closed loop.
 
 use super::loop_parameter::{LoopParameter, apply};
-use super::loop_problem::{LoopProblem, PERMITTED, divides};
+use super::loop_problem::{GRID_TOLERANCE, LoopProblem, PERMITTED};
 use super::loop_ripple::with_plant_of_loop;
 use super::loop_search::LoopMinimum;
 use virtual_axes_core::config::{AxisConfig, Periods};
@@ -9,12 +9,12 @@ use virtual_axes_core::units::{MILLISECOND_NS, Nanoseconds, seconds};
 
 /// Residual with the gain of the machine file, relative to the least one, up to which it is kept.
 pub(super) const KEPT: f64 = 1.1;
-/// The same for the cycle at which the signals are renewed.
-const RENEWED: f64 = 1.5;
+/// The same up to which a cycle is possible: the renewal of the signals, or one whose ripple explains the current.
+const POSSIBLE: f64 = 1.5;
 /// The same up to which a cycle is compared with the plant of its ripple.
 const COMPARED: f64 = 2.0;
 /// Residual of the current relative to the least one, from which on a cycle is none of the control.
-const CURRENT: f64 = 2.0;
+const CURRENT: f64 = 1.15;
 /// Largest number of fits with the plant of the ripple, which depend on each other, and change of the inertia that ends them.
 const PLANT_PASSES: usize = 4;
 const SAME_INERTIA: f64 = 0.02;
@@ -61,10 +61,10 @@ impl LoopProblem<'_> {
         Some((renewal / seconds(given.velocity)).round() as Nanoseconds * given.velocity)
     }
 
-    /// Returns the position cycle with the least residual, and the cycles with about the same residual. Residuals below the
-    /// resolution of the encoder or the error of interpolated setpoints count alike, unless the ripple of one cycle explains
-    /// the current far better. Among cycles with about the same residual, the renewal of the signals is preferred, then that
-    /// of the machine file if it divides the lag, then the first one.
+    /// Returns the best position cycle, and the cycles that are possible by their residuals, of which those below the resolution
+    /// of the encoder or the error of interpolated setpoints count alike. The best one is the renewal of the signals, or one
+    /// that divides the lag, whose ripple explains the current, with about the least residual; if several are, that of the
+    /// machine file, then the first one.
     ///
     /// A motion shows β + Tsp, so the others start with β changed by the difference of the cycles. Those that can be the least
     /// are compared with the plant that the current shows with the ripple of each.
@@ -103,24 +103,30 @@ impl LoopProblem<'_> {
         let floor = self.resolution().hypot(interpolation);
         let least = least(&all).max(count * floor.powi(2));
         let renewal = self.renewal(given);
-        let limit = |periods: &Periods| if Some(periods.position) == renewal { RENEWED } else { KEPT };
-        all.retain(|cycle| cycle.minimum.cost <= limit(&cycle.periods).powi(2) * least);
-        let current = all.iter().map(|cycle| cycle.current).fold(f64::INFINITY, f64::min);
-        all.retain(|cycle| {
-            Some(cycle.periods.position) == renewal || cycle.current <= CURRENT * CURRENT * current
-        });
-        let preference = |found: &&CycleMinimum| {
-            let cycle = found.periods.position;
-            let is_dividing = divides(cycle, found.minimum.values[0]);
-            (
-                Some(cycle) == self.renewal(given),
-                is_dividing && cycle == given.position,
-                cycle == start.position,
-                is_dividing,
-                cycle,
-            )
+        all.retain(|found| found.minimum.cost <= POSSIBLE * POSSIBLE * least);
+        // Of a lag between two cycles, what a machine file cannot have.
+        let rest = |found: &CycleMinimum| {
+            let tsp = seconds(found.periods.position);
+            let lag = found.minimum.values[0];
+            ((lag - (lag / tsp).round() * tsp).abs() / GRID_TOLERANCE) as usize
         };
-        let best = all.iter().max_by_key(preference).cloned()?;
+        let is_renewal = |found: &CycleMinimum| Some(found.periods.position) == renewal;
+        let least_rest = all.iter().map(rest).min()?;
+        let mut best = all.clone();
+        best.retain(|found| is_renewal(found) || rest(found) == least_rest);
+        let current = best.iter().map(|found| found.current).fold(f64::INFINITY, f64::min);
+        best.retain(|found| is_renewal(found) || found.current <= CURRENT * CURRENT * current);
+        let least = best
+            .iter()
+            .map(|found| found.minimum.cost)
+            .fold(f64::INFINITY, f64::min)
+            .max(count * floor.powi(2));
+        best.retain(|found| is_renewal(found) || found.minimum.cost <= KEPT * KEPT * least);
+        let preference = |found: &CycleMinimum| {
+            let cycle = found.periods.position;
+            (is_renewal(found), rest(found) == 0 && cycle == given.position, cycle == start.position, cycle)
+        };
+        let best = best.into_iter().max_by_key(preference)?;
         Some((best, all))
     }
 

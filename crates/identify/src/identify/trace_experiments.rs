@@ -20,9 +20,9 @@ const ENDING: usize = 6;
 /// Shortest span that is simulated, s.
 const SHORTEST: f64 = 1.0;
 
-/// Returns the spans of a recording as experiments with PSEC at the position cycles, `shift` s later than recorded: the
-/// setpoints themselves, if the recording shows each of them, otherwise interpolated. `logging` is that of the
-/// recorded current.
+/// Returns the spans of a recording as experiments with PSEC at the position cycles: the setpoints themselves, if the
+/// recording shows each of them, otherwise interpolated. The control logs actual values `shift` s late. `logging` is that of
+/// the recorded current.
 ///
 /// A span can begin in motion, after a gap for instance: the simulation accelerates from rest to its first velocity, and
 /// the samples until it has settled are left out.
@@ -52,7 +52,7 @@ pub(super) fn trace_experiments(
         let end = before + (knots.len() - 1) as f64 * distance;
         let cycles = (end / tsp).ceil() as usize + 1;
         let setpoint = |k: usize| {
-            let t = k as f64 * tsp - before - shift;
+            let t = k as f64 * tsp - before;
             if t >= 0.0 { spline.at(t)[0] } else { start - velocity * RUN_UP * run_up(t / RUN_UP + 1.0) }
         };
         let kept = skipped..span.position.len().saturating_sub(ENDING);
@@ -64,7 +64,7 @@ pub(super) fn trace_experiments(
             mode,
             cycle: tsp,
             psec: (0..cycles).map(setpoint).collect(),
-            first: before - origin + skipped as f64 * period,
+            first: before - origin + skipped as f64 * period - shift,
             period,
             trace_filter: signals.trace_filter,
             logging,
