@@ -315,9 +315,14 @@ def test_the_path_rotates_and_its_hover_names_the_line(browser: Browser, report:
         assert time.monotonic() < deadline, "no point under the mouse"
         for radius in range(0, 160, 4):
             mouse(browser, "mouseMoved", x + radius, y + 0.31 * radius)
-            time.sleep(0.02)
+            time.sleep(0.05)
+            if browser.evaluate("hovered.length"):
+                break
     text = browser.evaluate("hovered[0]")
     assert " s, contour error " in text and "µm" in text
+    fills = "[...document.querySelectorAll('.hovertext tspan')].map(line => getComputedStyle(line).fill)"
+    wait_for(browser, f"{fills}.length > 0")
+    assert "none" not in browser.evaluate(fills)
     if report.stem == "part_program":
         assert text.startswith("line ") and "feed " in text and ": N" in text
 
