@@ -344,6 +344,11 @@ def test_a_click_on_a_worst_line_shows_its_place(browser: Browser, report: Path)
     data = browser.evaluate("JSON.parse(document.querySelector('figure script').textContent).runs[0]")
     nearest = int(np.argmin(np.abs(np.array(data["time"]) - when)))
     assert data["lines"][nearest] == int(number) and data["error"][nearest] == max(data["error"])
+    # Row, color and chart have the same error.
+    errors = "document.querySelector('th button').closest('tr').querySelector('td.number').textContent"
+    assert float(browser.evaluate(errors)) == pytest.approx(data["error"][nearest], abs=0.005)
+    chart = browser.evaluate(f"(({{x, y}}) => [x, y])({plots_over('Time (s)')}[0].data[0])")
+    assert chart[1][chart[0].index(data["time"][nearest])] == data["error"][nearest]
     assert place == pytest.approx([data["reference"][a][nearest] + data["deviation"][a][nearest] for a in range(3)])
     found = browser.evaluate(f"{plots_over('Time (s)')}.map(plot => plot.layout.shapes.at(-1).x0)")
     assert len(found) >= 3 and found == pytest.approx([when] * len(found), abs=1e-3)

@@ -88,7 +88,7 @@ fn motions_at_feed_and_rapid_traverse_have_errors_of_their_own() {
     // At up to 30 m/min the axes deviate more than at 0.6 m/min.
     assert!(contour.max > 0.0 && rapids.max > contour.max, "{contour:?}");
     let lines = |lines: &[virtual_axes_nc::offline::WorstLine]| -> Vec<usize> {
-        let mut numbers: Vec<usize> = lines.iter().map(|worst| worst.line).collect();
+        let mut numbers: Vec<usize> = lines.iter().map(|worst| worst.cycle.line).collect();
         numbers.sort_unstable();
         numbers
     };
@@ -154,7 +154,8 @@ fn errors_are_those_against_the_programmed_corner() {
         assert!((cuts.max - largest).abs() < 1e-9, "{cuts:?} {largest}");
         assert!(cuts.max <= cuts.blending + cuts.drives);
         let worst = &program.worst_lines[0];
-        assert!(worst.error == cuts.max && worst.error <= worst.blending + worst.drives + 1e-12, "{worst:?}");
+        let CycleError { contour_error, blending, drives, .. } = worst.cycle;
+        assert!(contour_error == cuts.max && contour_error <= blending + drives + 1e-12, "{worst:?}");
         // Also with a tolerance so wide that the path turns in a curve.
         assert!(matches!(worst.cause, Cause::Corner), "{worst:?}");
     }

@@ -336,7 +336,7 @@ pub fn report(
             Some((lines, track, name)) => {
                 let figures = lines.finish(&name, PROGRAMS, &track, |cycle| path.add(cycle))?;
                 path.texts = line_texts(&name, PROGRAMS, &path.lines())?;
-                Some(ProgramReport { figures, path })
+                Some(ProgramReport::new(figures, path))
             }
             None => None,
         };

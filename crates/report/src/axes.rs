@@ -69,20 +69,27 @@ pub(super) fn errors(runs: &[ReportRun]) -> Option<Section> {
     let orientation = of_runs(|tool| &tool.orientation_error);
     let turns =
         orientation.iter().any(|s| peak(s.points.iter().map(|p| p[1])) > NEGLIGIBLE_ORIENTATION_ERROR);
-    let programs = runs.iter().enumerate().filter_map(|(i, run)| Some((i, run.program?)));
-    let feeds = programs.flat_map(|(i, program)| program.feeds(i, runs[i].title)).collect();
+    let programs: Vec<(usize, &ToolPath)> =
+        runs.iter().enumerate().filter_map(|(i, run)| Some((i, run.program?))).collect();
+    let path_errors = match programs.is_empty() {
+        true => of_runs(|tool| &tool.contour_error),
+        false => programs.iter().map(|&(i, program)| program.errors(i, runs[i].title)).collect(),
+    };
+    let feeds = programs.iter().flat_map(|&(i, program)| program.feeds(i, runs[i].title)).collect();
     let panels = vec![
-        panel("Contour error", DisplayUnit::MICROMETER, of_runs(|tool| &tool.contour_error)),
+        panel("Contour error", DisplayUnit::MICROMETER, path_errors),
         panel("Orientation error", DisplayUnit::MILLIDEGREE, if turns { orientation } else { Vec::new() }),
         panel("Feed", DisplayUnit::METER_PER_MINUTE, feeds),
     ];
-    let has_feed = panels.last().is_some_and(|feed| !feed.series.is_empty());
     let panels: Vec<Panel> = panels.into_iter().filter(|panel| !panel.series.is_empty()).collect();
     let mut section = Section::new("Errors of the tool");
     if !panels.is_empty() {
-        let (title, note) = match has_feed {
-            true => ("Errors and feed", "distance of the tool tip from the path; feed: speed of the tip"),
-            false => ("Errors", "distance of the tool tip from the path"),
+        let (title, note) = match programs.is_empty() {
+            true => ("Errors", "distance of the tool tip from the path"),
+            false => (
+                "Errors and feed",
+                "contour error: distance of the tool tip from the programmed path; feed: speed of the tip",
+            ),
         };
         section.charts.push(Chart { note: note.to_owned(), ..over_time(title, panels) });
     }

@@ -26,38 +26,58 @@ const LEAST_ERROR: f64 = 1e-7;
 /// Value with its time, s.
 type TimeValue = [f64; 2];
 
-/// Point of a path; stands also for dropped points beside it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct PathPoint {
-    /// Position cycle with the largest contour error.
-    at: CycleError,
-    /// Lowest and highest reached feed, m/s.
-    reached: [TimeValue; 2],
-    /// Highest programmed feed, m/s; NaN at rapid traverse and where rotary axes move alone.
-    programmed: TimeValue,
+/// Signal over time in bounded memory: groups of equally many values, each with its first, lowest, highest and last one.
+#[derive(Debug, Clone, Default)]
+struct Envelope {
+    groups: Vec<[TimeValue; 4]>,
+    /// Binary logarithm of the number of values of a group.
+    level: u32,
+    /// Number of values of the last group.
+    count: usize,
 }
 
-impl PathPoint {
-    fn is_rapid(&self) -> bool {
-        self.at.programmed_feed == f64::INFINITY
+impl Envelope {
+    fn add(&mut self, value: TimeValue) {
+        match self.groups.last_mut() {
+            Some(last) if self.count < 1 << self.level => {
+                *last = Self::joined(*last, [value; 4]);
+                self.count += 1;
+            }
+            _ => {
+                if self.groups.len() == MOST / 2 {
+                    self.groups = self.groups.chunks(2).map(|pair| Self::joined(pair[0], pair[1])).collect();
+                    self.level += 1;
+                }
+                self.groups.push([value; 4]);
+                self.count = 1;
+            }
+        }
     }
 
-    /// Returns the point with the larger error, with all extremes of the feed of both.
-    fn joined(self, next: Self) -> Self {
-        let least = |a: TimeValue, b: TimeValue| if b[1] < a[1] { b } else { a };
-        let most = |a: TimeValue, b: TimeValue| if b[1] > a[1] || a[1].is_nan() { b } else { a };
-        Self {
-            at: if next.at.contour_error > self.at.contour_error { next.at } else { self.at },
-            reached: [least(self.reached[0], next.reached[0]), most(self.reached[1], next.reached[1])],
-            programmed: most(self.programmed, next.programmed),
-        }
+    fn joined(a: [TimeValue; 4], b: [TimeValue; 4]) -> [TimeValue; 4] {
+        let least = if b[1][1] < a[1][1] || a[1][1].is_nan() { b[1] } else { a[1] };
+        let most = if b[2][1] > a[2][1] || a[2][1].is_nan() { b[2] } else { a[2] };
+        [a[0], least, most, b[3]]
+    }
+
+    fn points(&self) -> Vec<TimeValue> {
+        let mut points = self.groups.concat();
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        points.dedup_by_key(|point| point[0]);
+        points
     }
 }
 
 /// Path of the tool tip with contour error, feed and source line.
 #[derive(Debug, Clone, Default)]
 pub struct ToolPath {
-    points: Vec<PathPoint>,
+    points: Vec<CycleError>,
+    contour_error: Envelope,
+    reached_feed: Envelope,
+    /// Programmed feed, m/s; NaN at rapid traverse and where rotary axes move alone.
+    programmed_feed: Envelope,
+    /// Position cycles of the worst lines, which replace those of the same time.
+    pub(crate) worst: Vec<CycleError>,
     /// Texts of source lines.
     pub texts: BTreeMap<usize, String>,
 }
@@ -80,10 +100,11 @@ impl ToolPath {
 
     /// Adds a position cycle.
     pub fn add(&mut self, cycle: &CycleError) {
-        let feed = cycle.programmed_feed;
-        let programmed = if feed.is_finite() { feed } else { f64::NAN };
-        let reached = [[cycle.time, cycle.reached_feed]; 2];
-        self.points.push(PathPoint { at: *cycle, reached, programmed: [cycle.time, programmed] });
+        let programmed = Some(cycle.programmed_feed).filter(|feed| feed.is_finite());
+        self.contour_error.add([cycle.time, cycle.contour_error]);
+        self.reached_feed.add([cycle.time, cycle.reached_feed]);
+        self.programmed_feed.add([cycle.time, programmed.unwrap_or(f64::NAN)]);
+        self.points.push(*cycle);
         if self.points.len() == MOST {
             self.points = thinned(&self.points);
         }
@@ -91,34 +112,60 @@ impl ToolPath {
 
     /// Returns the source lines of the points.
     pub fn lines(&self) -> BTreeSet<usize> {
-        self.points.iter().map(|point| point.at.line).filter(|line| *line > 0).collect()
+        self.points.iter().map(|point| point.line).filter(|line| *line > 0).collect()
+    }
+
+    /// Returns the contour error against the programmed path over time.
+    pub(crate) fn errors(&self, run: usize, label: &str) -> ChartSeries {
+        let mut points = self.contour_error.points();
+        replace(&mut points, self.worst.iter().map(|cycle| [cycle.time, cycle.contour_error]), |point| {
+            point[0]
+        });
+        ChartSeries::new(label, SeriesStyle::Line(run), points).of_run(run)
     }
 
     /// Returns programmed and reached feed over time.
     pub(crate) fn feeds(&self, run: usize, label: &str) -> [ChartSeries; 2] {
-        let reached = self.points.iter().flat_map(|point| {
-            let [least, most] = point.reached;
-            if least[0] <= most[0] { [least, most] } else { [most, least] }
-        });
-        let programmed = self.points.iter().map(|point| point.programmed).collect();
+        let programmed = self.programmed_feed.points();
         [
             ChartSeries::new("programmed", SeriesStyle::Commanded, programmed).of_run(run),
-            ChartSeries::new(label, SeriesStyle::Line(run), reached.collect()).of_run(run),
+            ChartSeries::new(label, SeriesStyle::Line(run), self.reached_feed.points()).of_run(run),
         ]
+    }
+
+    /// Returns at most `most` points and those of the worst lines.
+    fn points(&self, most: usize) -> Vec<CycleError> {
+        let mut points = self.points.clone();
+        while points.len() > most {
+            points = thinned(&points);
+        }
+        replace(&mut points, self.worst.iter().copied(), |point| point.time);
+        points
+    }
+}
+
+/// Inserts values in the order of their times; they replace those of the same time.
+fn replace<T>(values: &mut Vec<T>, others: impl Iterator<Item = T>, time: impl Fn(&T) -> f64) {
+    for other in others {
+        let place = values.partition_point(|value| time(value) < time(&other));
+        match values.get_mut(place) {
+            Some(value) if time(value) == time(&other) => *value = other,
+            _ => values.insert(place, other),
+        }
     }
 }
 
 /// Drops about a quarter of the points: of the pairs of neighbors that are closest to a straight line, the point with the
 /// smaller error. Points between rapid traverse and feed stay.
-fn thinned(points: &[PathPoint]) -> Vec<PathPoint> {
+fn thinned(points: &[CycleError]) -> Vec<CycleError> {
     let cost = |pair: usize| {
         let (i, j) = (2 * pair, 2 * pair + 1);
-        if points[i].is_rapid() != points[j].is_rapid() {
+        if points[i].is_rapid != points[j].is_rapid {
             return f64::INFINITY;
         }
-        let dropped = if points[i].at.contour_error < points[j].at.contour_error { i } else { j };
+        let dropped = if points[i].contour_error < points[j].contour_error { i } else { j };
         match (points.get(dropped.wrapping_sub(1)), points.get(dropped + 1)) {
-            (Some(a), Some(b)) => from_line(points[dropped].at.tip, a.at.tip, b.at.tip),
+            (Some(a), Some(b)) => from_line(points[dropped].tip, a.tip, b.tip),
             _ => f64::INFINITY,
         }
     };
@@ -128,7 +175,7 @@ fn thinned(points: &[PathPoint]) -> Vec<PathPoint> {
     let dropped: BTreeSet<usize> = costs.into_iter().map(|(_, pair)| pair).collect();
     let pairs = points.chunks(2).enumerate();
     let kept = pairs.flat_map(|(number, pair)| match pair {
-        [a, b] if dropped.contains(&number) => vec![a.joined(*b)],
+        [a, b] if dropped.contains(&number) => vec![if b.contour_error > a.contour_error { *b } else { *a }],
         pair => pair.to_vec(),
     });
     kept.collect()
@@ -168,55 +215,47 @@ impl RunPath {
     /// Returns note and data of the figure of the paths that are more than a point; `None` without them.
     pub(crate) fn figure(paths: &[RunPath]) -> Option<(&'static str, Value)> {
         let span = |path: &ToolPath| {
-            let along = |axis| Extent::of(path.points.iter().map(|point| point.at.reference[axis]));
+            let along = |axis| Extent::of(path.points.iter().map(|point| point.reference[axis]));
             (0..3).filter_map(|axis| Some(along(axis)?.span())).fold(0.0, f64::max)
         };
         let paths: Vec<&RunPath> = paths.iter().filter(|run| span(&run.path) > 0.0).collect();
         let extent = paths.iter().map(|run| span(&run.path)).fold(0.0, f64::max);
-        let points = || paths.iter().flat_map(|run| &run.path.points);
-        let error = peak(points().map(|point| point.at.contour_error)).max(LEAST_ERROR);
+        let most = (MOST_OF_PAGE / paths.len().max(1)).max(MOST / 16);
+        let thinned: Vec<Vec<CycleError>> = paths.iter().map(|run| run.path.points(most)).collect();
+        let points = || thinned.iter().flatten();
+        let error = peak(points().map(|point| point.contour_error)).max(LEAST_ERROR);
         let magnification = round_down((SHARE * extent / error).max(1.0));
-        let has_rapids = points().any(PathPoint::is_rapid);
-        let note = if has_rapids {
+        let note = if points().any(|point| point.is_rapid) {
             "mm; color: contour error; dashed: rapid traverse"
         } else {
             "mm; color: contour error"
         };
-        let most = (MOST_OF_PAGE / paths.len().max(1)).max(MOST / 16);
-        let thinned = paths.iter().map(|run| {
-            let mut points = run.path.points.clone();
-            while points.len() > most {
-                points = thinned(&points);
-            }
-            points
-        });
-        let thinned: Vec<Vec<PathPoint>> = thinned.collect();
         let runs: Vec<Value> = paths.iter().zip(&thinned).map(|(run, points)| run.json(points)).collect();
-        let lines: BTreeSet<usize> = thinned.iter().flatten().map(|point| point.at.line).collect();
+        let lines: BTreeSet<usize> = points().map(|point| point.line).collect();
         let texts = paths.iter().flat_map(|run| &run.path.texts).filter(|(line, _)| lines.contains(line));
         let texts = bounded(texts.map(|(line, text)| (*line, text.clone())).collect());
         let json = json!({ "form": "path", "magnification": magnification, "runs": runs, "texts": texts });
         (!paths.is_empty()).then_some((note, json))
     }
 
-    fn json(&self, points: &[PathPoint]) -> Value {
-        let column = |value: &dyn Fn(&PathPoint) -> f64| -> Vec<Value> {
+    fn json(&self, points: &[CycleError]) -> Value {
+        let column = |value: &dyn Fn(&CycleError) -> f64| -> Vec<Value> {
             points.iter().map(|point| rounded(value(point))).collect()
         };
         let columns =
-            |value: &dyn Fn(&PathPoint, usize) -> f64| [0, 1, 2].map(|i| column(&|point| value(point, i)));
-        let lines: Vec<usize> = points.iter().map(|point| point.at.line).collect();
+            |value: &dyn Fn(&CycleError, usize) -> f64| [0, 1, 2].map(|i| column(&|point| value(point, i)));
+        let lines: Vec<usize> = points.iter().map(|point| point.line).collect();
         let has_lines = lines.iter().any(|line| *line > 0);
         json!({
             "title": self.title,
             "run": self.run,
-            "time": column(&|point| point.at.time),
-            "path": column(&|point| point.at.path_position / MILLIMETER),
-            "reference": columns(&|point, i| point.at.reference[i] / MILLIMETER),
-            "deviation": columns(&|point, i| ((point.at.tip[i] - point.at.reference[i]) * 1e9).round() * 1e-6),
-            "error": column(&|point| point.at.contour_error / MICROMETER),
-            "feed": if has_lines { column(&|point| point.at.reached_feed / METER_PER_MINUTE) } else { Vec::new() },
-            "rapid": if has_lines { column(&|point| f64::from(u8::from(point.is_rapid()))) } else { Vec::new() },
+            "time": column(&|point| point.time),
+            "path": column(&|point| point.path_position / MILLIMETER),
+            "reference": columns(&|point, i| point.reference[i] / MILLIMETER),
+            "deviation": columns(&|point, i| ((point.tip[i] - point.reference[i]) * 1e9).round() * 1e-6),
+            "error": column(&|point| point.contour_error / MICROMETER),
+            "feed": if has_lines { column(&|point| point.reached_feed / METER_PER_MINUTE) } else { Vec::new() },
+            "rapid": if has_lines { column(&|point| f64::from(u8::from(point.is_rapid))) } else { Vec::new() },
             "lines": if has_lines { lines } else { Vec::new() },
         })
     }
@@ -269,12 +308,12 @@ mod tests {
                 _ => 0.1,
             };
             if k % 2 == 0 && k > 100_000 {
-                cycle.programmed_feed = f64::INFINITY;
+                (cycle.programmed_feed, cycle.is_rapid) = (f64::INFINITY, true);
             }
             path.add(&cycle);
         }
         assert!(path.points.len() < MOST && path.points.len() > MOST / 2, "{}", path.points.len());
-        assert!(path.points.iter().any(|point| point.at == cycle(777, 9e-6)));
+        assert!(path.points.iter().any(|point| *point == cycle(777, 9e-6)));
         let [programmed, reached] = path.feeds(0, "reached");
         assert!(reached.points.contains(&[12.345, 0.5]) && reached.points.contains(&[1e-3 * 30_001.0, 0.01]));
         assert!(reached.points.windows(2).all(|pair| pair[0][0] <= pair[1][0]));
@@ -294,8 +333,40 @@ mod tests {
             thin = thinned(&thin);
         }
         assert!(thin.len() < 500, "{}", thin.len());
-        let near = |point: &PathPoint| distance(point.at.tip, [5000.0, 0.0, 0.0]) <= 1.0;
-        assert!(thin.iter().any(near) && thin[0].at == points[0]);
+        let near = |point: &CycleError| distance(point.tip, [5000.0, 0.0, 0.0]) <= 1.0;
+        assert!(thin.iter().any(near) && thin[0] == points[0]);
+    }
+
+    #[test]
+    fn the_feed_keeps_the_ends_of_plateaus() {
+        // Trapezoids of 1000 cycles on a straight path.
+        let feed = |k: usize| (k % 1000).min(1000 - k % 1000).min(200) as f64;
+        let count = 30 * MOST;
+        let mut path = ToolPath::default();
+        for k in 0..count {
+            path.add(&CycleError { reached_feed: feed(k), tip: [k as f64, 0.0, 0.0], ..cycle(k, 1e-6) });
+        }
+        let [_, reached] = path.feeds(0, "reached");
+        assert!(reached.points.len() <= 2 * MOST, "{}", reached.points.len());
+        for pair in reached.points.windows(2) {
+            let middle = ((pair[0][0] + pair[1][0]) / 2e-3).round() as usize;
+            let drawn = (pair[0][1] + pair[1][1]) / 2.0;
+            assert!((drawn - feed(middle)).abs() < 40.0, "{pair:?}: {}", feed(middle));
+        }
+    }
+
+    #[test]
+    fn cycles_of_worst_lines_are_kept() {
+        let mut path = ToolPath::default();
+        for k in 0..3 * MOST {
+            path.add(&CycleError { tip: [k as f64, 0.0, 0.0], ..cycle(k, 1e-6) });
+        }
+        path.worst = vec![cycle(777, 9e-6), cycle(778, 8e-6)];
+        let points = path.points(1000);
+        assert!(points.len() <= 1002 && path.worst.iter().all(|worst| points.contains(worst)));
+        assert!(points.windows(2).all(|pair| pair[0].time < pair[1].time));
+        let errors = path.errors(0, "").points;
+        assert!(errors.contains(&[0.777, 9e-6]) && errors.contains(&[0.778, 8e-6]));
     }
 
     #[test]

@@ -84,14 +84,14 @@ fn tool(tool: &ToolFigures) -> Value {
 pub fn part_program_json(figures: &ProgramFigures) -> Value {
     let line = |worst: &WorstLine| {
         json!({
-            "line": worst.line,
+            "line": worst.cycle.line,
             "text": worst.text,
             "cause": worst.cause.text(),
-            "contour_error_um": worst.error / MICROMETER,
-            "blending_um": worst.blending / MICROMETER,
-            "drives_um": worst.drives / MICROMETER,
+            "contour_error_um": worst.cycle.contour_error / MICROMETER,
+            "blending_um": worst.cycle.blending / MICROMETER,
+            "drives_um": worst.cycle.drives / MICROMETER,
             "orientation_error_mdeg": worst.orientation / MILLIDEGREE,
-            "time_s": worst.time,
+            "time_s": worst.cycle.time,
         })
     };
     let energy_line = |one: &LineEnergy| {

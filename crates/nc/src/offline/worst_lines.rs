@@ -81,20 +81,12 @@ impl Cause {
 /// Largest contour error of a line.
 #[derive(Debug, Clone)]
 pub struct WorstLine {
-    /// Source line, from 1.
-    pub line: usize,
+    /// Position cycle of the contour error. At a corner that is cut, error and blending are the distances from the corner.
+    pub cycle: CycleError,
     /// Text of the line.
     pub text: String,
-    /// Contour error against the programmed path, m.
-    pub error: f64,
-    /// Share of blending at that time, m: distance of the planned path from the programmed path.
-    pub blending: f64,
-    /// Share of the drives at that time, m: distance of the tool tip from the planned path.
-    pub drives: f64,
     /// Largest orientation error on the line, rad: angle between the tool axis and that of the nearest setpoint.
     pub orientation: f64,
-    /// Time of the contour error, s.
-    pub time: f64,
     /// Cause of the error.
     pub cause: Cause,
 }
@@ -444,7 +436,7 @@ impl LineErrors {
 
     /// Adds an error to the figures and worst lines; without a `cause`, that follows from the setpoints about `number`.
     fn record(&mut self, cycle: &CycleError, number: usize, cause: Option<Cause>) {
-        let CycleError { line, time, .. } = *cycle;
+        let line = cycle.line;
         let kind = usize::from(cycle.is_rapid);
         self.sums[kind].add(cycle);
         if let (Some(maxima), false) = (&mut self.line_maxima, cycle.is_rapid) {
@@ -452,14 +444,15 @@ impl LineErrors {
             *largest = largest.max(cycle.contour_error);
         }
         let (lines, error) = (&mut self.worst[kind], cycle.contour_error);
-        let known = lines.iter().position(|(worst, _)| worst.line == line);
+        let known = lines.iter().position(|(worst, _)| worst.cycle.line == line);
         let mut orientation = self.last_line.1;
         if let Some((worst, _)) = known.and_then(|known| lines.get_mut(known)) {
             worst.orientation = worst.orientation.max(orientation);
             orientation = worst.orientation;
         }
-        let least = lines.last().map_or(0.0, |(worst, _)| worst.error);
-        let is_new = known.map_or(lines.len() < COUNT || error > least, |i| error > lines[i].0.error);
+        let least = lines.last().map_or(0.0, |(worst, _)| worst.cycle.contour_error);
+        let is_new =
+            known.map_or(lines.len() < COUNT || error > least, |i| error > lines[i].0.cycle.contour_error);
         if !is_new {
             return;
         }
@@ -468,9 +461,8 @@ impl LineErrors {
         }
         let number = cause.is_none().then_some(number);
         let (text, cause) = (String::new(), cause.unwrap_or(Cause::Feed));
-        let CycleError { blending, drives, .. } = *cycle;
-        let entry = WorstLine { line, text, error, blending, drives, orientation, time, cause };
-        let place = lines.partition_point(|(worst, _)| worst.error >= error);
+        let entry = WorstLine { cycle: *cycle, text, orientation, cause };
+        let place = lines.partition_point(|(worst, _)| worst.cycle.contour_error >= error);
         lines.insert(place, (entry, number));
         lines.truncate(COUNT);
     }
@@ -557,12 +549,12 @@ impl LineErrors {
         self.evaluate_rest(visit);
         self.explain(0);
         let mut operations = self.operations.finish(&track.comments);
-        let numbers = self.worst.iter().flatten().map(|(worst, _)| worst.line);
+        let numbers = self.worst.iter().flatten().map(|(worst, _)| worst.cycle.line);
         let numbers = numbers.chain(operations.energy_lines.iter().map(|one| one.line)).collect();
         let texts = line_texts(name, builtin, &numbers)?;
         let text = |line: usize| texts.get(&line).cloned().unwrap_or_default();
         let [worst_lines, worst_rapids] = self.worst.map(|lines| {
-            lines.into_iter().map(|(worst, _)| WorstLine { text: text(worst.line), ..worst }).collect()
+            lines.into_iter().map(|(worst, _)| WorstLine { text: text(worst.cycle.line), ..worst }).collect()
         });
         operations.energy_lines.iter_mut().for_each(|one| one.text = text(one.line));
         let ProgramTrack { cycle_time, programmed_time, .. } = *track;

@@ -89,9 +89,16 @@ pub struct ProgramReport {
 }
 
 impl ProgramReport {
+    /// Creates a report whose path has the position cycles of the worst lines.
+    pub fn new(figures: ProgramFigures, mut path: ToolPath) -> Self {
+        let worst = figures.worst_lines.iter().chain(&figures.worst_rapids);
+        path.worst = worst.map(|worst| worst.cycle).collect();
+        Self { figures, path }
+    }
+
     /// Returns the worst lines as a table of the page, whose rows show their places.
     pub fn page_table(&self, caption: String, run: usize) -> Table {
-        let instants = self.lines().map(|(worst, _)| (run, worst.time)).collect();
+        let instants = self.lines().map(|(worst, _)| (run, worst.cycle.time)).collect();
         Table { caption, instants, ..self.worst_table(str::to_owned) }
     }
 
@@ -129,14 +136,14 @@ impl ProgramReport {
     pub fn worst_table(&self, escape: impl Fn(&str) -> String) -> Table {
         let row = |(worst, motion): (&WorstLine, &str)| {
             vec![
-                worst.line.to_string(),
+                worst.cycle.line.to_string(),
                 escape(&worst.text),
                 motion.to_owned(),
                 worst.cause.text(),
-                format!("{:.2}", worst.error / MICROMETER),
-                format!("{:.2}", worst.blending / MICROMETER),
-                format!("{:.2}", worst.drives / MICROMETER),
-                format!("{:.3}", worst.time),
+                format!("{:.2}", worst.cycle.contour_error / MICROMETER),
+                format!("{:.2}", worst.cycle.blending / MICROMETER),
+                format!("{:.2}", worst.cycle.drives / MICROMETER),
+                format!("{:.3}", worst.cycle.time),
             ]
         };
         let columns = [

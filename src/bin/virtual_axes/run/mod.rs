@@ -191,7 +191,7 @@ fn trial(
             if let (Some(reference), Some(cuts)) = (&arguments.reference, &figures.cuts) {
                 warn_of_other_reference(reference, cuts.blending);
             }
-            Some(ProgramReport { figures, path })
+            Some(ProgramReport::new(figures, path))
         }
         None => None,
     };
