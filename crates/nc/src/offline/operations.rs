@@ -246,7 +246,9 @@ impl OperationMeter {
         };
         let line = |(line, energy)| LineEnergy { line, text: String::new(), energy };
         let tools = tools.iter().map(tool).collect();
-        let mut energy_lines: Vec<LineEnergy> = self.lines.into_iter().map(line).collect();
+        // Line 0 is before the first motion.
+        let mut energy_lines: Vec<LineEnergy> =
+            self.lines.into_iter().filter(|(line, _)| *line > 0).map(line).collect();
         energy_lines.sort_by(|a, b| b.energy.input.total_cmp(&a.energy.input));
         energy_lines.truncate(LINES);
         OperationSummary { times: total.times(self.period), operations, tools, energy_lines }

@@ -44,7 +44,7 @@ const CORNER_RADIUS: f64 = 2e-3;
 /// Smallest turn that is a curved path, rad.
 const SMALLEST_TURN: f64 = 5e-3;
 /// Longest text of a line that is shown, characters.
-const TEXT: usize = 60;
+const TEXT: usize = 100;
 /// Largest change of the distance between the path positions of a program and its reference, relative to the path.
 const REFERENCE_DRIFT: f64 = 0.05;
 /// Number of bytes of a line that are read; the interpreter rejects longer lines.
