@@ -127,7 +127,11 @@ pub(super) fn report_result(inputs: &[IdentificationInput<'_>], tsp: f64, found:
     for refined in refinement.parameters.iter().filter(|p| p.is_at_bound) {
         found.findings.push(Finding::warning(
             "at-bound",
-            format!("{} ends at its bound {:.4}", refined.parameter, refined.value),
+            format!(
+                "{} ends at its bound {:.4}",
+                refined.parameter,
+                refined.value / refined.parameter.unit_size()
+            ),
             "record motions that excite it more, or exclude it from the refinement",
         ));
     }

@@ -11,6 +11,7 @@ use super::fit::{BoundedParameter, Effort, NonlinearFit, minimize};
 use super::friction::FrictionLaw;
 use virtual_axes_core::config::{AxisConfig, AxisKind, FrictionConfig, Periods};
 use virtual_axes_core::statistics::rms;
+use virtual_axes_core::units::{MILLISECOND, POSITION_GAIN};
 
 /// Number of passes; each one recomputes the weights of the channels from the residuals.
 const ROUNDS: usize = 2;
@@ -88,6 +89,15 @@ impl Serialize for RefinedParameter {
 }
 
 impl RefinedParameter {
+    /// Returns the SI value of the unit that the parameter has in a machine file.
+    pub fn unit_size(self) -> f64 {
+        match self {
+            RefinedParameter::PositionGain => POSITION_GAIN,
+            RefinedParameter::VelocityIntegralTime => MILLISECOND,
+            _ => 1.0,
+        }
+    }
+
     /// Returns the gravity parameters of an axis.
     pub fn of_gravity(axis: &AxisConfig) -> &'static [RefinedParameter] {
         match axis.kind() {

@@ -10,7 +10,7 @@ use super::gravity::{GravityCurrent, GravitySource};
 use super::identification::Identification;
 use super::refine::{RefinedParameter, RefinedValue};
 use virtual_axes_core::config::{Assignment, ConfigError, Parameters, Value, ValueSource};
-use virtual_axes_core::units::{DEGREE, MILLISECOND, MILLISECOND_NS, NEWTON_PER_MICROMETER, POSITION_GAIN};
+use virtual_axes_core::units::{DEGREE, MILLISECOND_NS, NEWTON_PER_MICROMETER};
 
 /// Digits of a value beyond the first digit of its standard error.
 const GUARD_DIGITS: i32 = 2;
@@ -311,11 +311,12 @@ impl Identification {
             let keys = ["feedforward.torque_kg_m2", "feedforward.torque_kg"];
             put(&keys, 0.0, None, None, "TFFWS is always 0".to_owned());
         }
-        for (parameter, keys, unit) in [
-            (RefinedParameter::PositionGain, ["position_loop.gain"; 1], POSITION_GAIN),
-            (RefinedParameter::VelocityGain, ["velocity_loop.gain"], 1.0),
-            (RefinedParameter::VelocityIntegralTime, ["velocity_loop.integral_time_ms"], MILLISECOND),
+        for (parameter, keys) in [
+            (RefinedParameter::PositionGain, ["position_loop.gain"; 1]),
+            (RefinedParameter::VelocityGain, ["velocity_loop.gain"]),
+            (RefinedParameter::VelocityIntegralTime, ["velocity_loop.integral_time_ms"]),
         ] {
+            let unit = parameter.unit_size();
             if let Some(found) = self.refined(parameter) {
                 let source = "jointly from positions".to_owned();
                 put(&keys, found.value / unit, Some(found.error / unit), None, source);

@@ -75,7 +75,7 @@ impl Weight<'_> {
             return format!("{} (eq. {equation}){unit}.", figures::regression(name, found));
         }
         if *equation == 7 && identification.feedforward.is_torque_zero {
-            return "TFFW = 0: TFFWS is 0 throughout with torque feedforward on.".to_owned();
+            return "TFFW = 0: TFFWS is 0 throughout.".to_owned();
         }
         let own = format!("feedforward.{}", if *equation == 6 { "velocity" } else { "torque" });
         let refined = identification.refinement.iter().flat_map(|refinement| &refinement.parameters);

@@ -39,7 +39,7 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
              which changes its sign with the direction of motion or of approach, and gravity, which does not."
         }
     };
-    section.paragraphs.push(format!("{method} {}.", capital(&figures::gravity(gravity))));
+    section.paragraphs.push(format!("{method} {}.", capital(&figures::gravity(gravity)).replace('-', "−")));
     if !found.steady.standstills.is_empty() {
         section.charts.push(chart(page, gravity, &found.steady.standstills));
     }

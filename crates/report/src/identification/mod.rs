@@ -110,13 +110,13 @@ impl IdentificationPage<'_> {
     /// Creates the section with all identified values and general findings.
     fn values(&self) -> Section {
         let found = &self.found.identification;
-        let refined = found.refinement.is_some();
+        let refinement = found.refinement.as_ref();
         let mut general: Vec<_> = found
             .findings
             .iter()
             // The first section has the reasons of an invalid result.
             .filter(|f| f.severity < Severity::Invalid)
-            .filter(|f| f.severity > Severity::Note || Step::of(f, refined).contains(&Step::Whole))
+            .filter(|f| f.severity > Severity::Note || Step::of(f, refinement).contains(&Step::Whole))
             .collect();
         // Missing results come first.
         general.sort_by_key(|finding| std::cmp::Reverse(finding.severity));

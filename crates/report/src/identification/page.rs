@@ -21,7 +21,7 @@ impl IdentificationPage<'_> {
     /// Creates the section of a step with its findings.
     pub(super) fn step(&self, heading: &str, step: Step) -> Section {
         let found = &self.found.identification;
-        let about = |finding: &&Finding| Step::of(finding, found.refinement.is_some()).contains(&step);
+        let about = |finding: &&Finding| Step::of(finding, found.refinement.as_ref()).contains(&step);
         let notices = found.findings.iter().filter(about).map(notice).collect();
         Section { notices, ..Section::new(heading) }
     }
@@ -68,6 +68,11 @@ impl IdentificationPage<'_> {
 /// Returns the unit of the exponents b and d of a friction law over a speed.
 pub(super) fn exponent_unit(speed_unit: &str) -> &'static str {
     if speed_unit == "rpm" { "min/rev" } else { "min/m" }
+}
+
+/// Returns the file name of a recording, whose path is among the facts.
+pub(super) fn file_name(recording: &str) -> &str {
+    recording.rsplit(['/', '\\']).next().unwrap_or(recording)
 }
 
 /// Converts a finding with its remedy to a notice.

@@ -6,7 +6,7 @@ use virtual_axes_identify::identify::{Agreement, ConditionedRecording, MotionSeg
 use virtual_axes_identify::recording::{SignalSpan, Signals};
 
 use super::figures;
-use super::page::{IdentificationPage, notice};
+use super::page::{IdentificationPage, file_name, notice};
 use crate::{
     Band, BandClass, Chart, ChartAxis, ChartSeries, DisplayUnit, Panel, Section, SeriesStyle, Table,
     TableColumn,
@@ -39,8 +39,9 @@ pub(super) fn single_recording(recorded: &ConditionedRecording, recording: &Reco
 
 /// Lists recordings with their sections and the parts of their motion.
 fn table(recordings: &[RecordingSummary]) -> Table {
-    let mut table =
-        figures::recordings(recordings.iter().map(|recording| (recording.name.clone(), recording)));
+    let mut table = figures::recordings(
+        recordings.iter().map(|recording| (file_name(&recording.name).to_owned(), recording)),
+    );
     table.columns.push(TableColumn::new("spans", ""));
     table
         .columns
@@ -69,7 +70,7 @@ fn chart(page: &IdentificationPage, signals: &Signals, agreement: Option<&Agreem
     Chart {
         bands: agreement.map_or_else(Vec::new, |agreement| bands(signals, &agreement.segments)),
         ..Chart::new(
-            format!("Recording {}", signals.name),
+            format!("Recording {}", file_name(&signals.name)),
             ChartAxis::new("Time", DisplayUnit::SECOND),
             panels,
         )

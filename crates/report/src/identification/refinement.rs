@@ -33,7 +33,7 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
         .map(|(a, b, rho)| format!("{a} with {b} ({})", number(*rho, 3)))
         .collect();
     section.paragraphs.push(if pairs.is_empty() {
-        "No two parameters are strongly correlated.".to_owned()
+        "No two refined parameters are strongly correlated.".to_owned()
     } else {
         format!(
             "Strongly correlated parameters, with their coefficient of correlation: {}. Their combined \
@@ -72,15 +72,20 @@ fn row(page: &IdentificationPage, refined: &RefinedValue) -> Vec<String> {
         RefinedParameter::Weight => "N".to_owned(),
         RefinedParameter::TiltSine | RefinedParameter::TiltCosine => "N·m".to_owned(),
         RefinedParameter::VelocityFeedforward => String::new(),
-        RefinedParameter::PositionGain => "1/s".to_owned(),
-        RefinedParameter::VelocityGain => "N·m·s".to_owned(),
-        RefinedParameter::VelocityIntegralTime => "s".to_owned(),
+        RefinedParameter::PositionGain
+        | RefinedParameter::VelocityGain
+        | RefinedParameter::VelocityIntegralTime => {
+            let key = format!(".{}", refined.parameter);
+            let value = page.found.summary.values.iter().find(|value| value.key.contains(&key));
+            value.map_or("", |value| value.unit).to_owned()
+        }
     };
+    let size = refined.parameter.unit_size();
     vec![
         refined.parameter.to_string(),
-        digits(refined.before, 5),
-        digits(refined.value, 5),
-        digits(refined.error, 2),
+        digits(refined.before / size, 5),
+        digits(refined.value / size, 5),
+        digits(refined.error / size, 2),
         unit,
         percent((refined.value - refined.before) / refined.before.abs()),
         if refined.is_at_bound { "yes" } else { "" }.to_owned(),

@@ -1,5 +1,6 @@
 //! Assignment of findings to the sections of the page.
 
+use virtual_axes_identify::identify::Refinement;
 use virtual_axes_identify::recording::Finding;
 
 /// Identification step to which a finding belongs.
@@ -18,9 +19,8 @@ pub(super) enum Step {
 }
 
 impl Step {
-    /// Returns the steps of a finding by its code; `Whole` for other codes. `refined` is true if there is a
-    /// refinement.
-    pub(super) fn of(finding: &Finding, refined: bool) -> &'static [Step] {
+    /// Returns the steps of a finding by its code; `Whole` for other codes.
+    pub(super) fn of(finding: &Finding, refinement: Option<&Refinement>) -> &'static [Step] {
         match finding.code {
             "no-current" => &[Step::Gravity, Step::Friction, Step::Inertia],
             "few-speeds" | "one-direction" | "asymmetric-friction" | "poor-friction-law" | "no-breakaway" => {
@@ -43,13 +43,36 @@ impl Step {
             "feedforward-not-constant" | "no-torque-feedforward" => &[Step::Feedforward],
             "no-setpoints" | "not-a-cascade" => &[Step::Delays, Step::Refinement],
             "unseen-delay" => &[Step::Delays],
-            "at-bound" if !refined => &[Step::Friction],
+            "at-bound" if refinement.is_none() => &[Step::Friction],
             "at-bound" | "not-refined" => &[Step::Refinement],
-            // The text of the refinement section lists the pairs.
-            "correlated" => &[],
+            "correlated" if refinement.is_some_and(|refinement| is_pair(finding, refinement)) => &[],
+            "correlated" => match ["gravity", "friction"].map(|name| finding.what.contains(name)) {
+                [true, true] => &[Step::Gravity, Step::Friction],
+                [true, false] => &[Step::Gravity],
+                [false, true] => &[Step::Friction],
+                [false, false] => &[Step::Inertia],
+            },
             "poor-current" => &[Step::Agreement],
             code if code.contains("gravity") || code.contains("static") => &[Step::Gravity],
             _ => &[Step::Whole],
         }
+    }
+}
+
+/// Returns true for a finding about a pair of refined parameters, which the text of the refinement section lists.
+fn is_pair(finding: &Finding, refinement: &Refinement) -> bool {
+    let pairs = refinement.correlated_pairs();
+    pairs.iter().any(|(a, b, _)| finding.what.starts_with(&format!("{a} and {b} ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn correlations_of_the_plant_are_notes_of_its_steps() {
+        let steps = |what: &str| Step::of(&Finding::note("correlated", what), None);
+        assert_eq!(steps("gravity and friction.a are strongly correlated"), [Step::Gravity, Step::Friction]);
+        assert_eq!(steps("friction.a and friction.c are strongly correlated"), [Step::Friction]);
     }
 }

@@ -4,7 +4,7 @@ use virtual_axes_identify::identify::summary::{BaselineSummary, IdentificationSu
 use virtual_axes_identify::recording::Severity;
 
 use super::figures;
-use super::page::{IdentificationPage, notice};
+use super::page::{IdentificationPage, file_name, notice};
 use crate::text::{capital, digits};
 use crate::{Section, Table};
 
@@ -34,8 +34,9 @@ pub(super) fn section(page: &IdentificationPage, machine_file: Option<&str>) -> 
 
 /// Returns the residuals with a baseline, those of validation recordings first.
 fn baselines(found: &IdentificationSummary) -> Vec<(String, bool, &ResidualSummary, &BaselineSummary)> {
-    let unseen = found.validation.iter().map(|v| (v.recording.name.clone(), true, &v.residuals));
-    let own = found.agreement.iter().map(|a| (a.name.clone(), false, &a.residuals));
+    let unseen =
+        found.validation.iter().map(|v| (file_name(&v.recording.name).to_owned(), true, &v.residuals));
+    let own = found.agreement.iter().map(|a| (file_name(&a.name).to_owned(), false, &a.residuals));
     let with_baseline = |(name, is_unseen, residuals): (String, bool, _)| {
         let residuals: &ResidualSummary = residuals;
         Some((name, is_unseen, residuals, residuals.baseline.as_ref()?))

@@ -17,12 +17,14 @@ pub fn text(found: &IdentificationSummary) -> String {
         text_table::text(&figures::all_recordings(found)),
         text_table::aligned(&figures::values(&found.values), &[0, 2, 5]),
     ];
-    parts.extend(found.friction.as_ref().map(|friction| {
-        let currents = figures::friction_currents(friction, found.speed_unit);
-        let currents = if currents.rows.is_empty() { String::new() } else { text_table::text(&currents) };
+    if let Some(friction) = &found.friction {
         let laws = text_table::text(&figures::friction_laws(friction, found.speed_unit));
-        format!("{}{laws}\n{currents}", text_table::wrapped_line(&figures::friction(friction)))
-    }));
+        parts.push(text_table::wrapped_line(&figures::friction(friction)) + &laws);
+        let currents = figures::friction_currents(friction, found.speed_unit);
+        if !currents.rows.is_empty() {
+            parts.push(text_table::text(&currents));
+        }
+    }
     parts.push(lines(figures::steps(found)));
     let residuals = figures::residuals(found);
     if !residuals.is_empty() {
