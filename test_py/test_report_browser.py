@@ -356,6 +356,24 @@ def test_a_click_on_a_worst_line_shows_its_place(browser: Browser, report: Path)
     assert number in browser.evaluate("document.querySelector('.place').textContent")
 
 
+def test_the_tool_bar_lies_beside_the_plots(browser: Browser, report: Path):
+    """No button of Plotly covers a curve, and no title of a color bar leaves its plot."""
+    browser.show_as()
+    show(browser, report)
+    box = "(({left, right, top, bottom}) => [left, right, top, bottom])"
+    bars, areas = (
+        browser.evaluate(f"{PLOTS}.map(plot => {box}(plot.querySelector('{part}').getBoundingClientRect()))")
+        for part in (".modebar", ".nsewdrag, .gl-container")
+    )
+    is_space = browser.evaluate(f"{PLOTS}.map(plot => plot.layout.scene !== undefined)")
+    for bar, area, has_scene in zip(bars, areas, is_space, strict=True):
+        assert has_scene or bar[0] >= area[1] - 1
+    titles = "[...document.querySelectorAll('.infolayer .colorbar text')]"
+    sides = f"{titles}.map(text => [text, text.closest('svg')].map(one => {box}(one.getBoundingClientRect())))"
+    for text, plot in browser.evaluate(sides):
+        assert plot[0] <= text[0] and text[1] <= plot[1]
+
+
 def test_a_run_can_be_hidden(browser: Browser, report: Path):
     """A switch hides the signals of a run in all plots."""
     if report.stem != "comparison":

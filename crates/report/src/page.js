@@ -13,6 +13,9 @@
   };
   const CONFIG = { responsive: true, displaylogo: false, displayModeBar: innerWidth > 760 ? "hover" : false, modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"] };
 
+  // Margin beside a plot, with room for the tool bar.
+  const RIGHT = CONFIG.displayModeBar ? 36 : 14;
+
   const figures = [...document.querySelectorAll("figure")].map(element => {
     const data = JSON.parse(element.querySelector("script").textContent);
     return { element, data, plot: element.querySelector(".plot"), isDrawn: false };
@@ -31,7 +34,7 @@
   // Cuts the text of a label before its unit, where the titles of panels stand above each other.
   const cut = label => {
     const [, text, unit = ""] = label.match(/^(.*?)( \([^()]*\))?$/s);
-    return (text.length > 20 ? text.slice(0, 19) + "…" : text) + unit;
+    return (text.length > 24 ? text.slice(0, 23) + "…" : text) + unit;
   };
   const isInside = (value, low, high) => low === null || low === undefined || (value >= low && value <= high);
   const isShown = run => run === null || run === undefined || !hidden.has(run);
@@ -68,10 +71,10 @@
     const at = (run, values) => isOverPath ? values.map(v => v === null ? null : pathPosition(run, v)) : values;
     const plotted = panels.length > 1 ? panels.length * (PANEL + GAP) - GAP : PANEL_ALONE;
     const layout = {
-      ...base({ l: 66, r: 14, t: 10, b: 46 }), height: plotted + 96, shapes: [], annotations: [],
+      ...base({ l: 66, r: RIGHT, t: 10, b: 46 }), height: plotted + 96, shapes: [], annotations: [],
       hovermode: data.form === "plain" ? "closest" : "x unified", hoversubplots: "axis",
       xaxis: axis(x, { anchor: panels.length > 1 ? `y${panels.length}` : "y", showspikes: true, spikemode: "across",
-        spikethickness: 1, spikecolor: color("zero"), spikedash: "solid", hoverformat: ".5~g" }),
+        spikethickness: 1, spikecolor: color("zero"), spikedash: "solid", hoverformat: ".5~g", ...inUnit(isOverPath ? "mm" : x.unit) }),
     };
     if (isOverPath) Object.assign(layout.xaxis, { title: { text: "Path position (mm)" }, autorange: true, range: undefined });
     // Time and path position have no zoom in common.
@@ -118,6 +121,9 @@
     return { traces, layout };
   }
 
+  // The box under the pointer has the unit, and of the ticks the last one at most.
+  const inUnit = unit => unit ? { ticksuffix: ` ${unit}`, showticksuffix: "last" } : {};
+
   function axis(data, more, values) {
     const isStacked = more.domain?.[1] - more.domain?.[0] < 1, label = isStacked ? cut(data.label) : data.label;
     const result = { title: { text: plain(label), standoff: 8, font: { size: label.length > 22 && isStacked ? 10 : 12 } }, gridcolor: color("grid"), zerolinecolor: color("zero"),
@@ -156,13 +162,17 @@
     const step = roundStep((high - low || 1) / 4), first = Math.floor(low / step) * step, last = Math.ceil(high / step) * step;
     const radius = value => 0.3 + 0.7 * (value - first) / (last - first || 1);
     const point = (value, angle) => [radius(value) * Math.cos(angle), radius(value) * Math.sin(angle)];
-    const layout = { ...base({ l: 20, r: 20, t: 10, b: 20 }), height: 480, plot_bgcolor: "rgba(0,0,0,0)", shapes: [],
+    const layout = { ...base({ l: 20, r: RIGHT, t: 10, b: 20 }), height: 480, plot_bgcolor: "rgba(0,0,0,0)", shapes: [],
       annotations: [], xaxis: { visible: false, range: [-1.18, 1.18] }, yaxis: { visible: false, range: [-1.18, 1.18], scaleanchor: "x" } };
+    // The curves are drawn over the scale.
+    const scale = { type: "scatter", mode: "text", x: [], y: [], text: [], textposition: "top center", hoverinfo: "skip", showlegend: false };
     for (let k = 0; first + k * step <= last + step / 2; k++) {
       const value = first + k * step, r = radius(value), isNominal = Math.abs(value) < step / 2, [x, y] = point(value, 1.18);
       layout.shapes.push({ type: "circle", layer: "below", x0: -r, x1: r, y0: -r, y1: r,
         line: isNominal ? { color: color("ink"), width: 2 } : { color: color("rule"), width: 1 } });
-      layout.annotations.push({ x, y, text: `${Number(value.toPrecision(6))} ${unit}`.replace("-", "−"), showarrow: false, bgcolor: color("page"), borderpad: 1 });
+      scale.x.push(x);
+      scale.y.push(y);
+      scale.text.push(`${Number(value.toPrecision(6))} ${unit}`.replace("-", "−"));
     }
     const [a, b] = data.axes.map(plain);
     [[`+${a}`, 1.1, 0], [`+${b}`, 0, 1.1], [`−${a}`, -1.1, 0], [`−${b}`, 0, -1.1]].forEach(([text, x, y]) =>
@@ -177,7 +187,7 @@
       return { ...trace, x: points.map(p => p[0]), y: points.map(p => p[1]),
         text: series.y.map((value, k) => `${digits(value, unit)} at ${digits((series.x[k] ?? 0) % 360, "°")}`), hoverinfo: "text+name" };
     });
-    return { traces, layout };
+    return { traces: [scale, ...traces], layout };
   }
 
   function roundStep(value) {
@@ -243,17 +253,18 @@
     const ticks = [];
     for (let power = Math.floor(low); power <= high; power++)
       for (const factor of high - low > 2 ? [1] : [1, 2, 5]) ticks.push(Number((factor * 10 ** power).toPrecision(3)));
-    const bar = isNarrow() ? { orientation: "h", y: hasSpace ? 0 : -0.2, yanchor: hasSpace ? "bottom" : "top", len: 0.9 } : { x: 1, len: 0.7 };
+    const bar = isNarrow() ? { orientation: "h", y: hasSpace ? 0 : -0.2, yanchor: hasSpace ? "bottom" : "top", len: 0.9 } : { x: 0.92, len: 0.7 };
     return { cmin: Math.min(low, high - 0.3), cmax: high, colorscale: [[0, color("low")], [0.5, color("middle")], [1, color("high")]],
-      colorbar: { title: { text: "error (µm)" }, tickvals: ticks.map(Math.log10), ticktext: ticks.map(String), thickness: 12,
+      colorbar: { title: { text: "error (µm)", side: isNarrow() ? "top" : "right" }, tickvals: ticks.map(Math.log10), ticktext: ticks.map(String), thickness: 12,
         outlinewidth: 0, ...bar } };
   }
 
   const isNarrow = () => space.plot.clientWidth < 500;
 
-  // Returns the ticks of an axis of the path: few where it is short, the last one with its name.
+  // Returns the ticks of an axis of the path: few where it is short, but two at least; the last one has its name.
   function coordinates(name, [low, high], longest) {
-    const step = roundStep((high - low) / Math.max(1, Math.round((isNarrow() ? 4 : 6) * (high - low) / longest)));
+    let step = roundStep((high - low) / Math.max(1, Math.round((isNarrow() ? 4 : 6) * (high - low) / longest)));
+    while (Math.floor(high / step) - Math.ceil(low / step) < 1) step = roundStep(step / 2.6);
     const tickvals = [];
     for (let k = Math.ceil(low / step); k * step <= high; k++) tickvals.push(Number((k * step).toPrecision(12)));
     return { tickvals, ticktext: tickvals.map((value, k) => (k === tickvals.length - 1 ? `${name} ` : "") + String(value).replace("-", "−")) };
@@ -275,7 +286,9 @@
       const visible = isShown(one.run), plotted = { type: "scatter3d", mode: "lines", meta: one.run, visible, hoverinfo: "text", showlegend: false };
       const point = i => shownPoint(one, i), onPath = i => [0, 1, 2].map(axis => one.reference[axis][i]);
       if (space.magnification > 1) traces.push({ ...plotted, ...segments(one, isCut(one), onPath), line: { color: color("zero"), width: 2 } });
-      if (one.rapid.includes(1)) traces.push({ ...plotted, ...segments(one, isRapid(one), point), line: { color: color("muted"), width: 2, dash: "dash" } });
+      const isInBox = i => point(i).every((value, axis) => isInside(value, ...ranges[axis]));
+      const isShownRapid = i => isRapid(one)(i) && (space.isWhole || (isInBox(i - 1) && isInBox(i)));
+      if (one.rapid.includes(1)) traces.push({ ...plotted, ...segments(one, isShownRapid, point), line: { color: color("muted"), width: 2, dash: "dash" } });
       const cuts = segments(one, isCut(one), point);
       traces.push({ ...plotted, ...cuts, line: { ...scale, color: cuts.color, width: 5, showscale: one === data.runs[0] } });
       const start = point(0);
@@ -295,7 +308,7 @@
       showbackground: false, color: color("muted"), tickfont: { size: 11 }, showticklabels: i !== away, ...coordinates(name, ranges[i], longest) });
     const height = isNarrow() ? 360 : 430, low = isNarrow() ? 0.17 : 0, size = edge(spans, longest, (1 - low) * height);
     const ratio = spans.map(span => size * span / longest);
-    const layout = { ...base({ l: 0, r: 0, t: 0, b: 0 }), height, scene: { domain: { y: [low, 1] },
+    const layout = { ...base({ l: 0, r: isNarrow() ? 0 : RIGHT, t: 0, b: 0 }), height, scene: { domain: { y: [low, 1] },
       xaxis: sceneAxis("X", 0), yaxis: sceneAxis("Y", 1), zaxis: sceneAxis("Z", 2), aspectmode: "manual",
       aspectratio: { x: ratio[0], y: ratio[1], z: ratio[2] }, annotations, dragmode: "turntable",
       camera: { eye: VIEWS[space.view], up: { x: 0, y: 0, z: 1 }, center: { x: 0, y: 0, z: 0 }, projection: { type: "orthographic" } },
@@ -309,7 +322,7 @@
     const [a, b] = [0, 1, 2].sort((i, j) => (ranges[j][1] - ranges[j][0]) - (ranges[i][1] - ranges[i][0])).slice(0, 2).sort();
     const title = i => ({ label: `${names[i].toUpperCase()} (mm)`, from: ranges[i][0], to: ranges[i][1] });
     return {
-      layout: { ...layout, scene: undefined, ...{ margin: { l: 60, r: 10, t: 10, b: 46 } }, xaxis: axis(title(a), {}),
+      layout: { ...layout, scene: undefined, ...{ margin: { l: 60, r: RIGHT, t: 10, b: 46 } }, xaxis: axis(title(a), {}),
         yaxis: axis(title(b), { scaleanchor: "x" }) },
       traces: traces.map(trace => ({ ...trace, type: "scatter", z: undefined, x: trace[names[a]], y: trace[names[b]],
         mode: trace.line?.colorscale || trace.mode === "markers" ? "markers" : "lines",
