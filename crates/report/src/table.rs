@@ -47,7 +47,9 @@ impl Table {
         names.retain(|name| seen.insert(*name));
         let value = |facts: &[(String, String)], name: &str| {
             let values = facts.iter().filter(|(n, _)| n == name).map(|(_, value)| value.as_str());
-            values.collect::<Vec<_>>().join(", ")
+            let values: Vec<&str> = values.collect();
+            let has_sentence = values.iter().any(|value| value.chars().count() > LONG);
+            values.join(if has_sentence { "\n" } else { ", " })
         };
         let row = |name: &str| {
             std::iter::once(name.to_owned()).chain(facts.iter().map(|facts| value(facts, name))).collect()
@@ -105,7 +107,7 @@ impl Html {
             match row.get(1).filter(|_| table.is_facts && is_same) {
                 Some(value) => {
                     let span = columns - 1;
-                    self.append(format_args!("<td class=\"same\" colspan=\"{span}\">{}</td>", prose(value)));
+                    self.append(format_args!("<td class=\"same\" colspan=\"{span}\">{}</td>", lines(value)));
                 }
                 None => (1..columns).for_each(|i| self.cell(table, i, row.get(i).map_or("", String::as_str))),
             }
@@ -134,8 +136,13 @@ impl Html {
             _ if !table.is_facts && text.chars().count() > LONG => " class=\"text\"",
             _ => "",
         };
-        self.append(format_args!("<td{class}>{}</td>", prose(&cell(text))));
+        self.append(format_args!("<td{class}>{}</td>", lines(&cell(text))));
     }
+}
+
+/// Returns a cell as HTML, each of its lines in a line of its own.
+fn lines(text: &str) -> String {
+    text.split('\n').map(prose).collect::<Vec<_>>().join("<br>")
 }
 
 /// Returns true if all cells of a column are numbers, also with a difference in parentheses, dashes or empty.

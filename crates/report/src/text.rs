@@ -36,9 +36,25 @@ pub(super) fn prose(text: &str) -> String {
             _ if index > 0 => "</code>",
             _ => "",
         };
-        out += &Text(piece).to_string();
+        out += &with_words(piece);
     }
     out
+}
+
+/// Number of characters of an option or a word of G code that no line ends within.
+const LONGEST_WORD: usize = 24;
+
+/// Returns untrusted text as HTML content in which no line ends at the minus sign of a number or an option.
+fn with_words(text: &str) -> String {
+    let word = |word: &str| {
+        let is_signed = word.trim_start_matches('(').starts_with('-')
+            || word.split('-').skip(1).any(|rest| rest.starts_with(|c: char| c.is_ascii_digit() || c == '.'));
+        match is_signed && word.chars().count() <= LONGEST_WORD {
+            true => format!("<span class=\"word\">{}</span>", Text(word)),
+            false => Text(word).to_string(),
+        }
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// Separator between groups of three digits.
@@ -145,7 +161,19 @@ mod tests {
     #[test]
     fn backticks_enclose_code() {
         let text = prose("record (`psec --part <both>`), or 5` long");
-        assert_eq!(text, "record (<code>psec --part &lt;both&gt;</code>), or 5` long");
+        assert_eq!(
+            text,
+            "record (<code>psec <span class=\"word\">--part</span> &lt;both&gt;</code>), or 5` long"
+        );
+    }
+
+    #[test]
+    fn no_line_ends_at_a_minus_sign() {
+        let text = prose("G1 X-.5 Z-2 after-run (-2)");
+        assert_eq!(
+            text,
+            "G1 <span class=\"word\">X-.5</span> <span class=\"word\">Z-2</span> after-run <span class=\"word\">(-2)</span>"
+        );
     }
 
     #[test]

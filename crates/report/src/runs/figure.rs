@@ -149,6 +149,7 @@ pub fn of_energy(figures: &Figures) -> Vec<Figure> {
         .collect();
     if let Some(link) = figures.dc_link {
         let new = |name: &str, value: f64, unit| Figure::new("DC link", name, value, unit);
+        found.push(new("electrical input", link.drawn - link.returned, "J").signed());
         found.push(new("energy drawn", link.drawn, "J"));
         found.push(new("energy fed back", link.returned, "J"));
         found.push(new("peak power", link.peak_power, "W").with_decimals(0));

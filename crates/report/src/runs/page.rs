@@ -68,19 +68,22 @@ impl SimulationPage<'_> {
         report.write(output)
     }
 
+    /// Returns a text with the title of the run if there are several runs, else with a capital letter.
+    fn of_run(&self, run: &SimulatedRun, text: &str) -> String {
+        if self.runs.len() > 1 { format!("{}: {text}", run.title()) } else { capital(text) }
+    }
+
     /// Returns times and worst lines of part programs, with the titles of the runs if there are several.
     fn overview(&self) -> Section {
         let mut section = Section::default();
         for (index, run) in self.runs.iter().enumerate() {
             let Some(program) = &run.part_program else { continue };
-            let of_run = if self.runs.len() > 1 { format!("{}: ", run.title()) } else { String::new() };
-            section.paragraphs.push(capital(&format!("{of_run}{}.", program.times())));
+            section.paragraphs.push(self.of_run(run, &format!("{}.", program.times())));
             section
                 .paragraphs
-                .push(capital(&format!("{of_run}{}.", time_shares(&program.figures.operations))));
-            section.tables.push(
-                program.page_table(capital(&format!("{of_run}lines with the largest contour errors")), index),
-            );
+                .push(self.of_run(run, &format!("{}.", time_shares(&program.figures.operations))));
+            let caption = self.of_run(run, "lines with the largest contour errors");
+            section.tables.push(program.page_table(caption, index));
         }
         section
     }
@@ -90,7 +93,6 @@ impl SimulationPage<'_> {
         let mut section = Section::new("Times and energy of the program");
         for run in self.runs {
             let Some(program) = &run.part_program else { continue };
-            let of_run = if self.runs.len() > 1 { format!("{}: ", run.title()) } else { String::new() };
             let parts = [
                 (
                     "times by operation",
@@ -99,8 +101,8 @@ impl SimulationPage<'_> {
                 ("times by tool", tools_table(&program.figures.operations)),
                 ("lines with the largest electrical input", program.energy_table(str::to_owned)),
             ];
-            let captioned = parts
-                .map(|(caption, table)| Table { caption: capital(&format!("{of_run}{caption}")), ..table });
+            let captioned =
+                parts.map(|(caption, table)| Table { caption: self.of_run(run, caption), ..table });
             section.tables.extend(captioned);
         }
         section
