@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 import virtual_axes_py as va
+from virtual_axes_py.arguments import in_python
 
 STILL = np.zeros((5, 5))
 
@@ -299,9 +300,24 @@ def test_a_part_program_of_a_sweep_needs_no_file_at_the_workers(machine: va.Mach
 
 def test_an_error_of_the_identification_names_arguments(machine: va.Machine) -> None:
     table = np.zeros(50, dtype=[("t_ms", float), ("position", float)])
-    with pytest.raises(ValueError, match='no column "clock".*by column CHANNEL=.* or give the .* by rate_hz') as found:
+    with pytest.raises(ValueError, match='no column "clock".*by column=CHANNEL=.* or give the .* by rate_hz') as found:
         va.identify(table, "x", machine, column="time=clock[ms]")
     assert "--" not in str(found.value)
+
+
+def test_messages_of_the_command_have_names_of_arguments() -> None:
+    text = "give those by --set, or --trace-filter-hz; --column 'time=#4' (`virtual_axes psec campaign --part off`)"
+    expected = (
+        "give those by Machine.with_, or trace_filter_hz; column='time=#4' (`virtual_axes psec campaign --part off`)"
+    )
+    assert in_python(text) == expected
+
+
+def test_a_note_of_a_part_program_names_arguments(machine: va.Machine, tmp_path: Path) -> None:
+    file = tmp_path / "part.nc"
+    file.write_text("O0001\nG21 G90 G94\nG1 X20 F3000\nM30\n")
+    with pytest.warns(UserWarning, match="dialect fanuc, detected from .*; dialect sets another"):
+        va.nc_program(file).psec(machine)
 
 
 def test_one_code_without_effect_needs_no_list(machine: va.Machine, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import control
 import numpy as np
@@ -76,6 +77,24 @@ def test_a_path_is_colored_by_the_contour_error(ballbar: va.Run) -> None:
         ballbar.plot_path("uv")
 
 
+def test_the_path_of_a_program_shows_the_motions_at_feed(machine: va.Machine, tmp_path: Path) -> None:
+    program = tmp_path / "corner.nc"
+    program.write_text("G21 G90 G64 P0.05\nG0 Z-100\nG1 X20 F2000\nY10\nG0 Z0\nM2\n")
+    run = machine.simulate(va.nc_program(program))
+    panel, bar = run.plot_path().axes
+    assert bar.get_ylabel() == "contour error from the polyline of setpoints, µm"
+    assert (panel.get_xlabel(), panel.get_ylabel()) == ("X, mm", "Y, mm")
+    assert np.ptp(panel.get_xlim()) < 40
+    _, rapids = panel.lines
+    assert (rapids.get_label(), rapids.get_linestyle()) == ("rapid traverse", "--")
+    (lines,) = panel.collections
+    cuts = run.figures["part_program"]["contour_error_um"]["cuts"]
+    assert lines.get_array().max() == pytest.approx(run.figures["contour_error_um"]["max"])
+    assert f"contour error {cuts['max']:.6g} µm" in repr(run)
+    # With the Z axis, rapid traverse is the longest.
+    assert run.plot_path("xz").axes[0].get_ylabel() == "Z, mm"
+
+
 def test_a_polar_plot_has_the_circular_deviation(ballbar: va.Run) -> None:
     figure = ballbar.plot_polar()
     figures = ballbar.figures["circles"]
@@ -88,6 +107,8 @@ def test_a_polar_plot_has_the_circular_deviation(ballbar: va.Run) -> None:
     numbers = [number.get_window_extent() for number in figure.axes[0].yaxis.get_ticklabels() if number.get_text()]
     assert len(numbers) > 2
     assert not any(inner.overlaps(outer) for inner, outer in zip(numbers, numbers[1:]))
+    legend, chart = figure.axes[0].get_legend().get_window_extent(), figure.axes[0].get_window_extent()
+    assert legend.y1 <= chart.y0
     with pytest.raises(ValueError, match="it must be polar"):
         ballbar.plot_polar(ax=plt.subplots()[1])
 

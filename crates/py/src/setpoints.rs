@@ -45,11 +45,19 @@ pub struct Rows {
     pub rapid: Vec<bool>,
 }
 
+/// Returns a message about a part program with the names of arguments in place of options.
+fn in_python(text: &str) -> String {
+    let names = ["dialect", "ignore", "work-offset", "tools", "tool-change-s", "spindle-s"];
+    names
+        .iter()
+        .fold(text.to_owned(), |text, name| text.replace(&format!("--{name}"), &name.replace('-', "_")))
+}
+
 impl Rows {
     fn read(mut source: impl GridSource) -> PyResult<Self> {
         let joints = source.joints().to_vec();
         let (mut row, mut values, mut rapid) = (vec![0.0; joints.len()], Vec::new(), Vec::new());
-        while source.next(&mut row).map_err(value_error)? {
+        while source.next(&mut row).map_err(|error| value_error(in_python(&error.to_string())))? {
             values.extend_from_slice(&row);
             rapid.push(source.is_rapid());
             if rapid.len().is_multiple_of(ROWS_PER_CHECK) {
@@ -294,14 +302,15 @@ impl PartProgram {
     pub fn rows(&self, machine: &PyMachine) -> PyResult<(Rows, ProgramTrack)> {
         let track = RefCell::default();
         let source = PartProgramSource::open(&self.path, PROGRAMS, &machine.config, &self.options, &track);
-        let rows = Rows::read(source.map_err(value_error)?)?;
+        let rows = Rows::read(source.map_err(|error| value_error(in_python(&error.to_string())))?)?;
         Ok((rows, track.into_inner()))
     }
 
     /// Warns of words without effect; `level` is the number of the frame of Python that the warning names.
     pub fn warn(&self, py: Python<'_>, track: &ProgramTrack, level: i32) -> PyResult<()> {
         for (line, note) in track.notes() {
-            let text = CString::new(format!("{}:{line}: {note}", self.path)).map_err(value_error)?;
+            let text = in_python(&format!("{}:{line}: {note}", self.path));
+            let text = CString::new(text).map_err(value_error)?;
             PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, level)?;
         }
         Ok(())
@@ -330,6 +339,16 @@ impl PartProgram {
         let (rows, track) = py.detach(|| self.rows(machine))?;
         self.warn(py, &track, 1)?;
         rows.into_array(py)
+    }
+
+    fn is_rapid<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = native)] machine: PyRef<'py, PyMachine>,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let machine: &PyMachine = &machine;
+        let (rows, _) = py.detach(|| self.rows(machine))?;
+        Ok(PyArray1::from_vec(py, rows.rapid))
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Recreation<'py, ProgramArguments>> {

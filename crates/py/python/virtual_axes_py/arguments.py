@@ -6,6 +6,7 @@ import difflib
 import json
 import operator
 import os
+import re
 import reprlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 Value = TypeVar("Value")
 MOST_LISTED = 20
 """Number of known names up to which an error lists them."""
+OPTION = re.compile(r"`[^`]*`|--column (?=\S*=)|--([a-z][a-z0-9-]*)")
+"""Option in a message of the command, or a command in backticks."""
 
 
 class Named(dict[str, Value]):
@@ -59,6 +62,17 @@ def named_errors(options: Mapping[str, Any]) -> Iterator[None]:
         if name not in options:
             raise
         raise TypeError(f"{name} is {reprlib.repr(options[name])}: {error.__cause__}") from None
+
+
+def in_python(text: str) -> str:
+    """Returns a message of the command with arguments in place of options, but in commands in backticks."""
+
+    def argument(found: re.Match[str]) -> str:
+        if found[1] is None:
+            return found[0].replace("--column ", "column=")
+        return "Machine.with_" if found[1] == "set" else found[1].replace("-", "_")
+
+    return OPTION.sub(argument, text)
 
 
 def to_array(name: str, values: Any) -> NDArray[Any]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from .arguments import Named, named_errors, read_json, to_native, to_path, to_real, to_text, unknown
+from .arguments import Named, in_python, named_errors, read_json, to_native, to_path, to_real, to_text, unknown
 from .machine import Machine
 from .run import embedded_page
 from .tables import columns_of, numbers
@@ -104,8 +104,7 @@ class Identification:
     @property
     def findings(self) -> list[str]:
         """Findings with their remedies, the most severe first: `invalid: …`, `missing: …`, `warning: …`, `note: …`."""
-        lines: list[str] = self._native.findings()
-        return lines
+        return [in_python(line) for line in self._native.findings()]
 
     @property
     def is_valid(self) -> bool:
@@ -219,14 +218,10 @@ def identify(
             found = Identification(_native.identify(native, to_text("axis", axis), files, both, others, options))
             for line in found.findings:
                 if UNREAD in line:
-                    warnings.warn(line.removeprefix("warning: ").replace("--column ", "column="), stacklevel=2)
+                    warnings.warn(line.removeprefix("warning: "), stacklevel=2)
             return found
     except ValueError as error:
-        # The options of the command have the names of the arguments, with dashes.
-        text = str(error)
-        for name in options:
-            text = text.replace(f"--{name.replace('_', '-')}", name)
-        raise ValueError(text) from None
+        raise ValueError(in_python(str(error))) from None
 
 
 def _rate(given: float) -> float:

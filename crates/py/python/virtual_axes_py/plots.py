@@ -7,15 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ._native import PartProgram
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from .design import FrequencyResponse
     from .run import Run
 
 UNITS = {"m": ("mm", 1e3, "µm", 1e6), "rad": ("°", np.degrees(1), "m°", np.degrees(1e3))}
 """Unit and factor of positions and of errors, by the unit of an axis."""
+MOST_LAG = 112
+"""Position cycles that the tool tip may lag behind its setpoint."""
 
 
 def _panels(titles: Sequence[str], given: Iterable[Axes] | None, shared: bool = True) -> list[Axes]:
@@ -94,6 +99,23 @@ def plot(run: Run, axes: Sequence[str] | None, ax: Iterable[Axes] | None) -> Fig
     return _figure_of(panels[0])
 
 
+def _is_rapid(run: Run) -> NDArray[np.bool_]:
+    """Returns True for each row with the tool tip at rapid traverse; False for all of a motion without feed."""
+    if not isinstance(run.setpoints, PartProgram):
+        return np.zeros(len(run.time), bool)
+    is_rapid = run.setpoints.is_rapid(run.machine)
+    cycles = np.floor(run.time / run.machine.position_period + 1e-6).astype(int)
+    rows = np.searchsorted(cycles, np.arange(min(MOST_LAG, cycles[-1] + 1)))
+
+    def deviation(lag: int) -> float:
+        late, early = run.tool_path[rows[lag] :], run.tool_setpoint[: len(run.time) - rows[lag]]
+        return float(np.mean((late - early) ** 2))
+
+    lag = min(range(len(rows)), key=deviation)
+    is_rapid = is_rapid[np.clip(cycles - lag, 0, len(is_rapid) - 1)]
+    return is_rapid & ~is_rapid.all()
+
+
 def plot_path(run: Run, plane: str | None, ax: Axes | None) -> Figure:
     """Draws the path of the tool tip, as `Run.plot_path` documents."""
     missing = [name for name in ("tool_path", "tool_setpoint", "contour_error") if name not in run.tool]
@@ -101,9 +123,15 @@ def plot_path(run: Run, plane: str | None, ax: Axes | None) -> Figure:
         raise ValueError(
             f"signal {missing[0]!r} of the tool is not recorded; it needs figures 'all' or 'contour', and all signals"
         )
-    setpoint, path = run.tool_setpoint * 1e3, run.tool_path * 1e3
+    is_cut = ~_is_rapid(run)
+    # A segment per cycle with the kind of motion and the error at its end.
+    is_drawn = is_cut | np.append(is_cut[1:], False)
+    setpoint, path = (
+        np.where(is_drawn[:, np.newaxis], one * 1e3, np.nan) for one in (run.tool_setpoint, run.tool_path)
+    )
     if plane is None:
-        longest = sorted(range(3), key=lambda index: (-round(float(np.ptp(setpoint[:, index])), 9), index))[:2]
+        extents = np.nanmax(setpoint, axis=0) - np.nanmin(setpoint, axis=0)
+        longest = sorted(range(3), key=lambda index: (-round(float(extents[index]), 9), index))[:2]
         plane = "".join("xyz"[index] for index in sorted(longest))
     if plane not in ("xy", "yz", "xz"):
         raise ValueError(f"plane {plane!r}: must be xy, yz or xz")
@@ -113,18 +141,21 @@ def plot_path(run: Run, plane: str | None, ax: Axes | None) -> Figure:
 
     panel.plot(*setpoint[:, columns].T, "--", color="0.6", linewidth=1, label="setpoint")
     points = path[:, columns]
-    # A segment per cycle with the error at its end.
-    segments = np.stack([points[:-1], points[1:]], axis=1)
+    segments = np.stack([points[:-1], points[1:]], axis=1)[is_cut[1:]]
     lines = LineCollection(list(segments), cmap="viridis", linewidth=2, label="tool tip")
-    lines.set_array(run.contour_error[1:] * 1e6)
+    lines.set_array(run.contour_error[1:][is_cut[1:]] * 1e6)
     panel.add_collection(lines)
     panel.autoscale_view()
+    if not is_cut.all():
+        rapids = np.where(is_cut[:, np.newaxis], np.nan, run.tool_path * 1e3)[:, columns]
+        panel.plot(*rapids.T, "--", color="0.4", linewidth=1, label="rapid traverse", scalex=False, scaley=False)
     panel.set_aspect("equal", adjustable="datalim")
     panel.set_xlabel(f"{plane[0].upper()}, mm")
     panel.set_ylabel(f"{plane[1].upper()}, mm")
     panel.grid(alpha=0.3)
     figure = _figure_of(panel)
-    figure.colorbar(lines, ax=panel, label="contour error, µm")
+    reference = " from the polyline of setpoints" if isinstance(run.setpoints, PartProgram) else ""
+    figure.colorbar(lines, ax=panel, label=f"contour error{reference}, µm")
     return figure
 
 
@@ -151,7 +182,7 @@ def plot_polar(run: Run, ax: Axes | None) -> Figure:
     # The ring is narrow: the numbers of more circles would overlap.
     panel.set_rticks([tick for tick in MaxNLocator(4).tick_values(low, high) if low <= tick <= high])
     panel.set_title("radial deviation, µm")
-    panel.legend(loc="lower right", fontsize="small")
+    panel.legend(loc="upper center", bbox_to_anchor=(0.5, -0.06), fontsize="small")
     return _figure_of(panel)
 
 

@@ -254,8 +254,10 @@ class Run:
     def plot_path(self, plane: str | None = None, *, ax: Axes | None = None) -> Figure:
         """Draws the path of the tool tip in the workpiece frame, mm, colored by the contour error (needs matplotlib).
 
-        `plane` is `xy`, `yz` or `xz`, by default that of the longest extents. Returns the figure, that of `ax` if it is
-        given. Raises `ValueError` for another plane, or if the signals of the tool are not recorded.
+        `plane` is `xy`, `yz` or `xz`, by default that of the longest extents. Of a part program, which is planned
+        again, rapid traverse is dashed, and plane, limits and colors are those of the motions at feed. Returns the
+        figure, that of `ax` if it is given. Raises `ValueError` for another plane, or if the signals of the tool are
+        not recorded.
         """
         from . import plots
 
@@ -283,9 +285,16 @@ class Run:
         """Returns machine, moving axes, duration and largest contour error in one line."""
         moving = [name for name, axis in self.figures["axes"].items() if axis["moves"]]
         parts = [self.machine.name, f"{', '.join(moving) or 'no axis'} moving", f"{self.figures['duration_s']:.6g} s"]
-        if self.figures["contour_error_um"]:
-            parts.append(f"contour error {self.figures['contour_error_um']['max']:.6g} µm")
+        if contour := self._contour_error():
+            parts.append(f"contour error {contour['max']:.6g} µm")
         return f"Run({'; '.join(parts)})"
+
+    def _contour_error(self) -> dict[str, float] | None:
+        """Returns the contour error, µm: of a part program that of the motions at feed from the programmed path."""
+        if part := self.figures.get("part_program"):
+            errors = part["contour_error_um"]
+            return errors["cuts"] or errors["rapids"]  # type: ignore[no-any-return]
+        return self.figures["contour_error_um"]  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
         """Returns the report for a notebook; the table of the axes if there is none, as for a removed part program."""
@@ -304,7 +313,7 @@ class Run:
             for name, axis in self.figures["axes"].items()
             for error in (axis["following_error"],)
         )
-        contour = self.figures["contour_error_um"]
+        contour = self._contour_error()
         note = f"<p>contour error: max {contour['max']:.2f} µm, RMS {contour['rms']:.2f} µm</p>" if contour else ""
         return f"<table>{head}{rows}</table>{note}"
 
