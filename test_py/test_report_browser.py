@@ -303,6 +303,8 @@ def test_the_path_rotates_and_its_hover_names_the_line(browser: Browser, report:
     show(browser, report)
     eye = "(({x, y, z}) => [x, y, z])(document.querySelector('.plot')._fullLayout.scene._scene.getCamera().eye)"
     before = browser.evaluate(eye)
+    ticks = "(({xaxis, yaxis, zaxis}) => [xaxis, yaxis, zaxis].map(axis => axis.tickvals.length))"
+    assert min(browser.evaluate(f"{ticks}(document.querySelector('.plot').layout.scene)")) >= 2
     x, y = middle(browser, "document.querySelector('.plot canvas')")
     drag(browser, (x - 40, y - 10), (x + 60, y + 20))
     wait_for(browser, f"Math.abs({eye}[0] - {before[0]}) > 0.05")

@@ -264,9 +264,12 @@
   // Returns the ticks of an axis of the path: few where it is short, but two at least; the last one has its name.
   function coordinates(name, [low, high], longest) {
     let step = roundStep((high - low) / Math.max(1, Math.round((isNarrow() ? 4 : 6) * (high - low) / longest)));
-    while (Math.floor(high / step) - Math.ceil(low / step) < 1) step = roundStep(step / 2.6);
+    const count = () => Math.floor(high / step) - Math.ceil(low / step) + 1, isShort = count() < 2;
+    while (count() < 2) step = roundStep(step / 2.6);
     const tickvals = [];
     for (let k = Math.ceil(low / step); k * step <= high; k++) tickvals.push(Number((k * step).toPrecision(12)));
+    // Of a short axis, the ends only: the numbers between them would overlap.
+    if (isShort) tickvals.splice(1, tickvals.length - 2);
     return { tickvals, ticktext: tickvals.map((value, k) => (k === tickvals.length - 1 ? `${name} ` : "") + String(value).replace("-", "−")) };
   }
 
