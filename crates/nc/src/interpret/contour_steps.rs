@@ -7,16 +7,20 @@ use super::state::State;
 use crate::motion::{Feed, MotionKind, ProgramEvent, ProgramMotion, ProgramStep};
 
 impl State {
-    /// Starts cutter radius compensation with the next motion in the active plane, or ends it (`None`).
+    /// Starts cutter radius compensation with the next motion in the active plane, or ends it (`None`). That in effect
+    /// continues.
     pub(super) fn compensate(&mut self, compensation: Option<Compensation>) -> Outcome<()> {
-        self.finish_contour()?;
         let plane = self.modal.plane;
         // A tool of radius 0 follows the contour.
         let compensation = compensation.filter(|compensation| compensation.radius != 0.0);
-        self.contour.compensation = compensation.map(|compensation| {
+        let compensation = compensation.map(|compensation| {
             let (plane, sign) = self.map().image_of(plane).unwrap_or((plane, 1.0));
             (Compensation { is_left: compensation.is_left == (sign > 0.0), ..compensation }, plane)
         });
+        if compensation.is_none() || compensation != self.contour.compensation {
+            self.finish_contour()?;
+            self.contour.compensation = compensation;
+        }
         Ok(())
     }
 

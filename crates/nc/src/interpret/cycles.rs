@@ -16,6 +16,8 @@ use crate::motion::{AXIS_COUNT, AXIS_LETTERS, PathControl, ProgramEvent};
 const MILLISECOND: f64 = 1e-3;
 /// Distance above the last depth to which a peck returns at rapid traverse, as in LinuxCNC, m.
 const CLEARANCE: f64 = 0.254 * MILLIMETER;
+/// Rounding of a sum of pecks, m.
+const ROUNDING: f64 = 1e-12;
 
 /// Programmed coordinates of the drilling axis in one line of a cycle, m.
 struct Levels {
@@ -92,16 +94,7 @@ impl State {
         if self.modal.feed_mode == FeedMode::InverseTime {
             return Err(format!("{name} requires G94 or G95"));
         }
-        let mut cycle = self.modal.cycle.filter(|cycle| cycle.code == code).unwrap_or(Cycle {
-            code,
-            initial: self.programmed()[drill],
-            retract: None,
-            bottom: None,
-            dwell: None,
-            peck: None,
-            extra: [None; 3],
-            retraction_factor: None,
-        });
+        let mut cycle = self.started_cycle(code);
         let levels = self.read_cycle(block, &mut cycle)?;
         let pecks = pecks(&cycle, levels.retract - levels.bottom, is_linuxcnc);
         let repeats = match offsets {
@@ -116,12 +109,15 @@ impl State {
                 Rounded(strokes)
             ));
         }
+        let polar = self.polar_words(block);
         let (start, target) = (self.programmed(), self.targets(block)?);
         self.modal.cycle = Some(cycle);
 
         let is_okuma = self.dialect == Dialect::Okuma;
         let to_initial = self.modal.retracts_to_initial && !is_okuma;
-        let mut level = if to_initial { cycle.initial } else { start[drill] };
+        // LinuxCNC rises to the initial level on the way to the hole, other controls cross at the present one.
+        let mut level =
+            if to_initial && is_linuxcnc { cycle.initial.max(start[drill]) } else { start[drill] };
         let is_below = is_back_boring(code);
         if level < levels.retract && !is_below {
             level = levels.retract;
@@ -131,7 +127,7 @@ impl State {
         }
         let path_control = std::mem::replace(&mut self.modal.path_control, PathControl::ExactPath);
         let clear = match self.modal.return_level {
-            _ if to_initial || is_below => level,
+            _ if to_initial || is_below => cycle.initial.max(levels.retract),
             (ReturnLevel::Specified, Some(specified)) if is_okuma => specified.max(levels.retract),
             (ReturnLevel::UpperLimit, _) if is_okuma && self.options.upper_limits[drill].is_finite() => {
                 self.options.upper_limits[drill] - self.origin(drill)
@@ -146,13 +142,18 @@ impl State {
             self.rapid_to(&end)?;
         }
         for repeat in 0..repeats {
-            let mut end = self.programmed();
+            let hole = self.programmed();
+            let mut end = hole;
             if let Some(offset) = offsets.and_then(|offsets| offsets.get(repeat as usize)) {
                 end[first] = target[first] + offset[0];
                 end[second] = target[second] + offset[1];
             } else if repeat == 0 || self.modal.is_incremental {
                 for axis in (0..AXIS_COUNT).filter(|axis| *axis != drill) {
                     end[axis] += target[axis] - start[axis];
+                }
+                if repeat > 0 && self.modal.polar.is_some() {
+                    (end[first], end[second]) = (hole[first], hole[second]);
+                    self.replace_polar(polar, [first, second], &mut end);
                 }
             }
             end[drill] = if repeat == 0 { level } else { levels.clear };
@@ -167,6 +168,27 @@ impl State {
         }
         self.modal.path_control = path_control;
         Ok(())
+    }
+
+    /// Returns the cycle in effect with a code. The initial level of another code remains; Fanuc keeps depth, plane R, peck
+    /// and dwell, too.
+    fn started_cycle(&self, code: Motion) -> Cycle {
+        let drill = self.modal.plane.axes()[2];
+        let keeps_words = self.dialect == Dialect::Fanuc;
+        match self.modal.cycle {
+            Some(cycle) if cycle.code == code => cycle,
+            Some(cycle) if keeps_words => Cycle { code, extra: [None; 3], retraction_factor: None, ..cycle },
+            before => Cycle {
+                code,
+                initial: before.map_or_else(|| self.programmed()[drill], |cycle| cycle.initial),
+                retract: None,
+                bottom: None,
+                dwell: None,
+                peck: None,
+                extra: [None; 3],
+                retraction_factor: None,
+            },
+        }
     }
 
     /// Returns the number of holes of a line: word L, or K of Fanuc.
@@ -187,7 +209,9 @@ impl State {
         let drill = self.modal.plane.axes()[2];
         let (letter, length, name) = (AXIS_LETTERS[drill], self.modal.length, g_name(cycle.code.number()));
         let is_incremental = self.modal.is_incremental;
-        let is_linuxcnc = self.dialect == Dialect::LinuxCnc;
+        let [is_linuxcnc, is_haas] =
+            [Dialect::LinuxCnc, Dialect::Haas].map(|dialect| self.dialect == dialect);
+        let is_changed = self.modal.cycle.is_some_and(|before| before.code != cycle.code);
         // Controls with macro B keep the levels of the line that has the words, also for lines with G91.
         let keeps_levels = self.dialect.has_macro_b();
         let word = block.take('R').map(|retract| retract * length);
@@ -195,7 +219,10 @@ impl State {
         let retract = match (word, cycle.retract) {
             (None, Some(retract)) if keeps_levels => retract,
             (Some(retract), _) | (None, Some(retract)) => retract + base,
-            (None, None) if is_linuxcnc => return Err(format!("{name} requires R, the plane of retraction")),
+            // After another cycle of Haas, the plane R would be a guess.
+            (None, None) if is_linuxcnc || (is_haas && is_changed) => {
+                return Err(format!("{name} requires R, the plane of retraction"));
+            }
             (None, None) => cycle.initial,
         };
         cycle.retract = if keeps_levels { word.and(Some(retract)) } else { word }.or(cycle.retract);
@@ -235,7 +262,7 @@ impl State {
             cycle.peck.ok_or_else(|| format!("{name} requires Q above 0, the depth of a peck"))?;
         }
         if !is_linuxcnc {
-            if is_tapping(cycle.code) && self.dialect == Dialect::Haas {
+            if is_tapping(cycle.code) && is_haas {
                 cycle.retraction_factor = block.take_rate('J')?.filter(|factor| *factor > 0.0);
             }
             let last = if self.dialect == Dialect::Fanuc { 2 } else { 3 };
@@ -260,10 +287,14 @@ impl State {
         if pecks.count > 1.0 {
             let mut peck = pecks.first;
             let mut depth = levels.retract - peck;
+            let mut since_retraction = 0.0;
             while depth > levels.bottom {
                 self.feed_along(drill, depth)?;
-                if cycle.code == Motion::PeckDrilling {
+                since_retraction += peck;
+                let is_due = pecks.retraction.is_some_and(|depth| since_retraction >= depth - ROUNDING);
+                if cycle.code == Motion::PeckDrilling || is_due {
                     self.rapid_along(drill, levels.retract)?;
+                    since_retraction = 0.0;
                 }
                 self.rapid_along(drill, depth + CLEARANCE)?;
                 peck = (peck - pecks.reduction).max(pecks.least);
@@ -271,7 +302,10 @@ impl State {
             }
         }
         self.feed_along(drill, levels.bottom)?;
-        if let Some(dwell) = cycle.dwell {
+        // Drilling and boring of Fanuc and Haas have no dwell.
+        let has_none = matches!(self.dialect, Dialect::Fanuc | Dialect::Haas)
+            && matches!(cycle.code, Motion::Drilling | Motion::Boring);
+        if let Some(dwell) = cycle.dwell.filter(|_| !has_none) {
             self.push_event(ProgramEvent::Dwell(dwell));
         }
         match cycle.code {
@@ -362,11 +396,13 @@ struct Pecks {
     /// Reduction from one peck to the next, and the least peck.
     reduction: f64,
     least: f64,
+    /// Depth after which G73 of Haas with Q and K retracts to the plane R.
+    retraction: Option<f64>,
 }
 
 /// Returns the pecks of a hole by Q, or by I, J and K of Haas.
 fn pecks(cycle: &Cycle, depth: f64, is_linuxcnc: bool) -> Pecks {
-    let none = Pecks { count: 1.0, first: depth, reduction: 0.0, least: depth };
+    let none = Pecks { count: 1.0, first: depth, reduction: 0.0, least: depth, retraction: None };
     if !has_pecks(cycle.code) {
         return none;
     }
@@ -375,11 +411,15 @@ fn pecks(cycle: &Cycle, depth: f64, is_linuxcnc: bool) -> Pecks {
         (Some(first), _) => {
             let least = least.filter(|least| *least > 0.0).unwrap_or(first);
             let count = (depth / least.min(first)).ceil();
-            Pecks { count, first, reduction: reduction.unwrap_or(0.0).max(0.0), least }
+            Pecks { count, first, reduction: reduction.unwrap_or(0.0).max(0.0), least, retraction: None }
         }
-        (None, Some(peck)) => {
-            Pecks { count: (depth / peck).ceil(), first: peck, reduction: 0.0, least: peck }
-        }
+        (None, Some(peck)) => Pecks {
+            count: (depth / peck).ceil(),
+            first: peck,
+            reduction: 0.0,
+            least: peck,
+            retraction: least.filter(|depth| *depth > 0.0 && cycle.code == Motion::ChipBreaking),
+        },
         (None, None) => none,
     }
 }

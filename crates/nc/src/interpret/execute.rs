@@ -316,6 +316,12 @@ impl State {
                 "dwell P is in ms, as in the dialect {}; in s it would be {value} s",
                 self.dialect
             ));
+        } else if has_point && self.dialect == Dialect::Fanuc && value >= LONG_DWELL {
+            self.assume(format!(
+                "dwell P{value}. with a decimal point is {value} s, where Fanuc has P without one: write P{value} for \
+                 {} s",
+                value * MILLISECOND
+            ));
         } else if !is_ms && !has_ms && value >= LONG_DWELL {
             self.assume(format!(
                 "dwell P{value} is {value} s, as in the dialect {}; in ms, as Fanuc has it, it would be {} s \
@@ -475,14 +481,14 @@ impl State {
                 if self.dialect.has_macro_b() {
                     block.skip("XYZABCUVW");
                 }
-                self.offsets.shift = [0.0; AXIS_COUNT];
+                [self.offsets.shift, self.offsets.local] = [[0.0; AXIS_COUNT]; 2];
                 self.offsets.saved_shift = self.offsets.shift;
             }
             Some(Action::SuspendShift) => self.offsets.shift = [0.0; AXIS_COUNT],
             Some(Action::RestoreShift) => self.offsets.shift = self.offsets.saved_shift,
         }
         if let Some(motion) = motion {
-            if self.modal.motion != Some(motion) {
+            if !is_canned(motion) {
                 self.modal.cycle = None;
             }
             self.modal.motion = match (motion, self.dialect) {

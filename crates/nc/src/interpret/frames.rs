@@ -11,9 +11,11 @@ use super::line_words::LineWords;
 use super::state::State;
 use crate::motion::{AXIS_LETTERS, Coordinates};
 
-/// Index of scaling, mirroring and rotation in the parts of the frame.
-const SCALING: usize = 0;
+/// Index of the scaling in the parts of the frame.
+pub(super) const SCALING: usize = 0;
+/// Index of the mirroring.
 const MIRROR: usize = 1;
+/// Index of the rotation.
 const ROTATION: usize = 2;
 /// Factor of a P without decimal point in G51 of Fanuc and Haas.
 const THOUSANDTH: f64 = 1e-3;
@@ -28,6 +30,7 @@ impl State {
         match codes.g.polar {
             Some(Polar::On) => {
                 self.modal.polar = Some([0.0; 2]);
+                self.modal.polar_center = [0.0; 2];
                 // The center is the position on Mach3, and the zero of the workpiece on other controls.
                 if self.dialect == Dialect::Mach3 {
                     let [first, second, _] = self.modal.plane.axes();
@@ -228,24 +231,33 @@ impl State {
         self.push_rapid(end)
     }
 
-    /// Replaces the words of the plane by their meaning in polar coordinates (G16): radius and angle.
+    /// Returns the words of the plane as radius, m, and angle, degrees.
+    pub(super) fn polar_words(&self, block: &LineWords) -> [Option<f64>; 2] {
+        let [first, second, _] = self.modal.plane.axes();
+        let radius = block.get(AXIS_LETTERS[first]).map(|radius| radius * self.modal.length);
+        [radius, block.get(AXIS_LETTERS[second])]
+    }
+
+    /// Replaces the coordinates `end` in the plane, before the motion, by those of polar coordinates (G16): radius and angle.
+    /// An incremental radius of Fanuc and Haas begins at the position, which becomes the center.
     pub(super) fn replace_polar(
         &mut self,
-        words: &[bool; 2],
+        [radius_word, angle_word]: [Option<f64>; 2],
         [first, second]: [usize; 2],
         end: &mut Coordinates,
-        raw: [f64; 2],
     ) {
+        let is_incremental = self.modal.is_incremental;
+        if radius_word.is_some() && self.dialect.has_macro_b() {
+            self.modal.polar_center = if is_incremental { [end[first], end[second]] } else { [0.0; 2] };
+        }
         let center = self.modal.polar_center;
         let Some([radius, angle]) = &mut self.modal.polar else { return };
-        if !words[0] && !words[1] {
+        if radius_word.is_none() && angle_word.is_none() {
             return;
         }
-        if words[0] {
-            *radius = raw[0];
-        }
-        if words[1] {
-            *angle = if self.modal.is_incremental { *angle + raw[1] } else { raw[1] };
+        *radius = radius_word.unwrap_or(*radius);
+        if let Some(word) = angle_word {
+            *angle = if is_incremental { *angle + word } else { word };
         }
         let (sin, cos) = angle.to_radians().sin_cos();
         (end[first], end[second]) = (center[0] + *radius * cos, center[1] + *radius * sin);

@@ -39,6 +39,7 @@ mod spline;
 mod state;
 mod surface;
 mod text;
+mod tool_offsets;
 mod tools;
 mod turning;
 mod work_offset;

@@ -8,6 +8,7 @@ use virtual_axes_core::units::{DEGREE, MINUTE, RPM};
 use super::codes::{FeedMode, Motion, g_name};
 use super::dialect::Dialect;
 use super::error::Outcome;
+use super::frames::SCALING;
 use super::limits::{MAX_ANGLE, MAX_LENGTH};
 use super::line_words::LineWords;
 use super::parameters::LOCALS;
@@ -94,7 +95,8 @@ impl State {
         let mut end = self.programmed();
         let increments = self.take_increments(block);
         let [first, second, _] = self.modal.plane.axes();
-        let in_plane = [first, second].map(|axis| block.get(AXIS_LETTERS[axis]));
+        let polar = self.polar_words(block);
+        let before = [end[first], end[second]];
         let words = self.take_axes(block)?;
         for (end, value) in end.iter_mut().zip(words) {
             let Some(value) = value else { continue };
@@ -114,8 +116,8 @@ impl State {
             (end[first], end[second]) = (radius * cos, radius * sin);
         }
         if self.modal.polar.is_some() {
-            let raw = [words[first].unwrap_or(0.0), in_plane[1].unwrap_or(0.0)];
-            self.replace_polar(&in_plane.map(|word| word.is_some()), [first, second], &mut end, raw);
+            [end[first], end[second]] = before;
+            self.replace_polar(polar, [first, second], &mut end);
         }
         for (end, increment) in end.iter_mut().zip(increments) {
             *end += increment.unwrap_or(0.0);
@@ -262,6 +264,14 @@ impl State {
         let map = self.map();
         let start = self.programmed();
         let [first, second, _] = arc.plane.axes();
+        let has_one_factor = self.modal.frames[SCALING].image_of(arc.plane).is_some();
+        if !has_one_factor && self.dialect == Dialect::Fanuc {
+            return Err(
+                "an arc with different factors I, J and K of G51 is not supported, the control gives no ellipse: program \
+                 one factor P, or G50 before the arc"
+                    .to_owned(),
+            );
+        }
         let Some((plane, sign)) = map.image_of(arc.plane) else {
             return self.chords_to(arc, &start, programmed);
         };

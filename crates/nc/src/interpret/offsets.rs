@@ -1,22 +1,24 @@
-//! Offsets and references: G10, G28, G30, G40 to G44, G49, G52 to G59.3, G92.
+//! Offsets and references: G10, G28, G30, G52 to G59.3, G92.
 
-use virtual_axes_core::units::{MILLIMETER, Rounded};
-
-use super::codes::{
-    Action, Codes, CoordinateSystem, CutterCompensation, KinematicsSwitch, ToolLength, g_name,
-};
-use super::contour::Compensation;
+use super::codes::{Action, Codes, CoordinateSystem, g_name};
 use super::dialect::Dialect;
 use super::error::Outcome;
 use super::limits::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
 use super::line_words::LineWords;
 use super::okuma::PREFIX;
 use super::parameters::integer;
-use super::state::State;
+use super::state::{Offsets, State};
 use super::work_offset::system_name;
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS};
 
 impl State {
+    /// Returns the upper travel limit of an axis in the coordinates in effect and units of the program.
+    pub(super) fn upper_limit(&self, axis: usize) -> Option<f64> {
+        let origin = if self.modal.is_machine { 0.0 } else { self.origin(axis) };
+        let limit = self.options.upper_limits[axis];
+        limit.is_finite().then(|| (limit - origin) / self.unit(axis))
+    }
+
     /// Returns true if a named parameter belongs to the control.
     pub(super) fn is_of_control(&self, name: &str) -> bool {
         self.is_defined(name) && self.parameters.named(name).is_none()
@@ -293,11 +295,17 @@ impl State {
             return Err(format!("{} requires at least one axis word", g_name(code.number())));
         }
         self.finish_contour()?;
+        let has_local = self.dialect.has_macro_b();
         if code == Action::Shift {
-            for (shift, value) in self.offsets.shift.iter_mut().zip(words) {
+            let Offsets { local, shift, .. } = &mut self.offsets;
+            for (shift, value) in if has_local { local } else { shift }.iter_mut().zip(words) {
                 *shift = value.unwrap_or(*shift);
             }
         } else {
+            // G92 ends the local shift of its axes.
+            for (local, _) in self.offsets.local.iter_mut().zip(words).filter(|(_, word)| word.is_some()) {
+                *local = 0.0;
+            }
             let rotation = self.offsets.rotations.get(&self.offsets.active).copied().unwrap_or(0.0);
             let (sin, cos) = rotation.sin_cos();
             self.set_coordinates(&words, self.offsets.active, |state, axis, value| match axis {
@@ -314,166 +322,6 @@ impl State {
         }
         self.offsets.saved_shift = self.offsets.shift;
         Ok(())
-    }
-
-    /// Sets the tool length: G43, G43.1, G43.2, G43.4, G43.5, G44, G234, G49.
-    pub(super) fn set_tool_length(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
-        let Some(code) = codes.g.tool_length else { return Ok(()) };
-        match code {
-            ToolLength::Off | ToolLength::OffByG53 | ToolLength::CenterPointOff => {
-                self.leave_tcp();
-                self.offsets.tool_length = 0.0;
-                block.take_integer('H')?;
-            }
-            ToolLength::Given => {
-                let words = self.take_axes(block)?;
-                if words.iter().enumerate().any(|(axis, word)| axis != 2 && word.is_some()) {
-                    return Err("G43.1: only Z is supported".to_owned());
-                }
-                self.leave_tcp();
-                self.offsets.tool_length = words[2].ok_or("G43.1 requires Z, the tool length")?;
-            }
-            _ => {
-                let length = match block.take_integer('H')? {
-                    Some(0) => 0.0,
-                    tool => self.tool_length(tool.unwrap_or(self.modal.tool))?,
-                };
-                self.leave_tcp();
-                match code {
-                    ToolLength::CenterPoint
-                    | ToolLength::CenterPointVector
-                    | ToolLength::CenterPoint234
-                    | ToolLength::CenterPoint169 => {
-                        self.enter_tcp(length)?;
-                        self.modal.has_tool_vectors = code == ToolLength::CenterPointVector;
-                    }
-                    ToolLength::Additional => self.offsets.tool_length += length,
-                    ToolLength::Negative => self.offsets.tool_length = -length,
-                    _ => self.offsets.tool_length = length,
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Switches between tool center point control and positions of the axes, as the machines of LinuxCNC with switchable
-    /// kinematics do: M428, M429, M430.
-    pub(super) fn switch_kinematics(&mut self, codes: &Codes) -> Outcome<()> {
-        let Some(code) = codes.m.kinematics else { return Ok(()) };
-        let has_tables = self.options.kinematics.is_some() && (3..6).any(|axis| self.options.axes[axis]);
-        match (code, self.modal.tcp_length) {
-            (KinematicsSwitch::CenterPoint, None) if has_tables => self.enter_tcp(self.offsets.tool_length),
-            (KinematicsSwitch::Axes | KinematicsSwitch::User, Some(length)) => {
-                self.leave_tcp();
-                self.offsets.tool_length = length;
-                Ok(())
-            }
-            _ => {
-                self.note_without_effect(format!("M{}", code.number()));
-                Ok(())
-            }
-        }
-    }
-
-    /// Returns the length of a tool, m; a tool that is missing in the table has the default length, which is reported.
-    pub(super) fn tool_length(&mut self, number: u32) -> Outcome<f64> {
-        if let Some(tool) = self.options.tools.get(number) {
-            return Ok(tool.length);
-        }
-        let missing = || format!("tool {number} is not in the tool table");
-        let length = self.options.default_tool_length.ok_or_else(missing)?;
-        if length == 0.0 {
-            self.assume(format!("{}: length 0", missing()));
-        } else if self.dialect != Dialect::LinuxCnc {
-            // These controls have lengths in memory, not in a file beside the program.
-            self.assume(format!(
-                "tools without entry in the tool table have the tool length of the machine, {} mm",
-                Rounded(length / MILLIMETER)
-            ));
-        }
-        Ok(length)
-    }
-
-    /// Starts or ends cutter radius compensation: G40, G41, G42, G41.1, G42.1.
-    pub(super) fn set_compensation(&mut self, block: &mut LineWords, codes: &Codes) -> Outcome<()> {
-        use CutterCompensation::{Left, LeftDiameter, Off, Right, RightDiameter};
-        let Some(code) = codes.g.cutter_compensation else {
-            if self.dialect != Dialect::LinuxCnc
-                && let Some(number) = block.take_integer('D')?
-            {
-                self.modal.radius_number = Some(number);
-            }
-            return Ok(());
-        };
-        let is_left = matches!(code, Left | LeftDiameter);
-        let radius = match code {
-            Off => {
-                if self.dialect != Dialect::LinuxCnc {
-                    block.skip("D");
-                }
-                return self.compensate(None);
-            }
-            LeftDiameter | RightDiameter => {
-                let diameter =
-                    block.take('D').ok_or("G41.1 and G42.1 require D, the diameter of the tool")?;
-                block.skip("L");
-                0.5 * diameter * self.modal.length
-            }
-            Left | Right if self.dialect == Dialect::Mach3 && block.get('P').is_some() => {
-                block.take('P').unwrap_or_default() * self.modal.length
-            }
-            Left | Right => {
-                let mut number = block.take_integer('D')?;
-                if self.dialect.has_macro_b() && number.is_none() && codes.g.tool_length.is_none() {
-                    // Older controls have the radius in the table of H.
-                    number = block.take_integer('H')?;
-                }
-                self.modal.radius_number = number.or(self.modal.radius_number);
-                // LinuxCNC takes the tool in the spindle, other controls the last D.
-                let last = self.modal.radius_number.filter(|_| self.dialect != Dialect::LinuxCnc);
-                if self.dialect.has_macro_b() && last.is_none() {
-                    self.assume("G41 and G42 without D: the radius of the tool in the spindle".to_owned());
-                }
-                self.tool_radius(number.or(last).unwrap_or(self.modal.tool))
-            }
-        };
-        self.compensate(Some(Compensation { is_left, radius }))
-    }
-
-    /// Returns the radius of a tool, m; 0 for one that is missing in the table, which is reported.
-    pub(super) fn tool_radius(&mut self, number: u32) -> f64 {
-        match self.options.tools.get(number) {
-            Some(tool) => tool.radius,
-            None if number == 0 => 0.0,
-            None => {
-                self.assume(format!(
-                    "tool {number} is not in the tool table: radius 0, the contour is the path"
-                ));
-                0.0
-            }
-        }
-    }
-
-    /// Starts tool center point control: the position becomes the tip of the tool.
-    pub(super) fn enter_tcp(&mut self, length: f64) -> Outcome<()> {
-        let transform = self.options.kinematics.as_ref();
-        let transform = transform.ok_or("G43.4 requires a machine with kinematics; program G43")?;
-        let axes = self.position;
-        transform.tip(&mut self.position, length);
-        self.offsets.tcp_start = Some([self.position, axes]);
-        self.modal.tcp_length = Some(length);
-        self.offsets.tool_length = 0.0;
-        Ok(())
-    }
-
-    /// Ends tool center point control: the position becomes that of the axes.
-    pub(super) fn leave_tcp(&mut self) {
-        if let (Some(length), Some(transform)) = (self.modal.tcp_length.take(), &self.options.kinematics) {
-            match self.offsets.tcp_start {
-                Some([tip, axes]) if tip == self.position => self.position = axes,
-                _ => transform.axis_positions(&mut self.position, length),
-            }
-        }
     }
 
     /// Moves through the programmed coordinates to a reference: G28, G30.

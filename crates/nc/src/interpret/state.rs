@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use virtual_axes_core::text::escaped;
 use virtual_axes_core::units::{DEGREE, MILLIMETER};
 
-use super::codes::{FeedMode, Motion, PlaneCode, ReturnLevel};
+use super::codes::{CutterCompensation, FeedMode, Motion, PlaneCode, ReturnLevel, ToolLength};
 use super::contour::{Contour, Corner};
 use super::dialect::Dialect;
 use super::error::Outcome;
@@ -113,8 +113,10 @@ pub(super) struct Offsets {
     pub active: usize,
     /// Rotations of work coordinate systems about Z (G10 L2 R), rad.
     pub rotations: BTreeMap<usize, f64>,
-    /// Offset of G92 or G52.
+    /// Offset of G92, and of G52 without a local coordinate system.
     pub shift: Coordinates,
+    /// Local coordinate system of Fanuc and Haas (G52).
+    pub local: Coordinates,
     /// Offset that G92.3 restores.
     pub saved_shift: Coordinates,
     /// Tool length offset along Z (G43); 0 with tool center point control.
@@ -152,6 +154,10 @@ pub(super) struct Modal {
     pub flood: bool,
     /// Tool length of tool center point control, m.
     pub tcp_length: Option<f64>,
+    /// Code of the tool length in effect.
+    pub tool_length_code: Option<ToolLength>,
+    /// Code of the cutter compensation in effect.
+    pub cutter_compensation_code: Option<CutterCompensation>,
     /// True if I, J and K are the direction of the tool (G43.5).
     pub has_tool_vectors: bool,
     /// Number of the offset with the tool radius (D).
@@ -224,6 +230,8 @@ impl State {
             mist: false,
             flood: false,
             tcp_length: None,
+            tool_length_code: None,
+            cutter_compensation_code: None,
             has_tool_vectors: false,
             radius_number: None,
             polar: None,
@@ -245,6 +253,7 @@ impl State {
                 active: 0,
                 rotations: BTreeMap::new(),
                 shift: none,
+                local: none,
                 saved_shift: none,
                 tool_length: 0.0,
                 tcp_start: None,
@@ -291,7 +300,7 @@ impl State {
     pub(super) fn origin(&self, axis: usize) -> f64 {
         let work = self.options.work_offsets[self.offsets.active][axis];
         let tool = if axis == 2 { self.offsets.tool_length } else { 0.0 };
-        work + self.offsets.shift[axis] + tool
+        work + self.offsets.shift[axis] + self.offsets.local[axis] + tool
     }
 
     /// Returns the programmed coordinate of the position, in units of the program.
@@ -375,7 +384,7 @@ impl State {
         let tool = Vector3::new(0.0, 0.0, tool_length);
         let work = CoordinateFrame::shift(vector(&self.options.work_offsets[system]) + tool);
         let rotation = self.offsets.rotations.get(&system).copied().unwrap_or(0.0);
-        let shift = vector(&self.offsets.shift);
+        let shift = vector(&self.offsets.shift) + vector(&self.offsets.local);
         let outer = match rotation == 0.0 {
             true => CoordinateFrame::shift(work.origin + shift),
             false => work.then(&CoordinateFrame::rotation(2, rotation)).then(&CoordinateFrame::shift(shift)),
@@ -531,13 +540,6 @@ impl State {
             false => "has no value: set it before it is used",
         };
         value.ok_or_else(|| format!("#<{name}> {remedy}"))
-    }
-
-    /// Returns the upper travel limit of an axis in the coordinates in effect and units of the program.
-    fn upper_limit(&self, axis: usize) -> Option<f64> {
-        let origin = if self.modal.is_machine { 0.0 } else { self.origin(axis) };
-        let limit = self.options.upper_limits[axis];
-        limit.is_finite().then(|| (limit - origin) / self.unit(axis))
     }
 
     /// Returns true if `#<name>` has a value.
