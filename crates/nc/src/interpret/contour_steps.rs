@@ -1,6 +1,6 @@
 //! Steps of the contour: motions and events pass corners and cutter radius compensation in their order.
 
-use super::contour::{Compensation, Compensator, Contour, ContourPiece, Point, SAME};
+use super::contour::{Compensation, Compensator, Contour, ContourPiece, Point, SAME, require_in_front};
 use super::dialect::Dialect;
 use super::error::Outcome;
 use super::state::State;
@@ -33,9 +33,10 @@ impl State {
             }
         }
         if let Some(mut compensator) = self.contour.compensator.take() {
-            let center = compensator.end(&mut self.contour.out);
+            let end = compensator.end(&mut self.contour.out);
             let plane = self.contour.compensation.map_or(self.modal.plane, |(_, plane)| plane);
-            self.contour.leave = center.map(|center| (center, plane));
+            self.contour.leave = end.map(|(center, _)| (center, plane));
+            self.contour.leave_direction = end.map(|(_, direction)| direction);
         }
         self.steps.extend(self.contour.out.drain(..));
         Ok(())
@@ -97,6 +98,14 @@ impl State {
                     "the motion after the end of cutter compensation must be a straight line".to_owned()
                 );
             }
+            let leave = self.contour.leave_direction.take();
+            if let (Some(direction), true, None) =
+                (leave, self.contour.goes_around, self.contour.compensation)
+            {
+                let end = Point::new(motion.end[first], motion.end[second]);
+                let contour = Point::new(motion.start[first], motion.start[second]);
+                require_in_front((end - contour).dot(&direction))?;
+            }
             [motion.start[first], motion.start[second]] = point.into();
         }
         let Some((compensation, plane)) = self.contour.compensation else {
@@ -106,7 +115,10 @@ impl State {
         let ends_perpendicular =
             matches!(self.dialect, Dialect::LinuxCnc | Dialect::Mach3 | Dialect::Grbl | Dialect::Marlin);
         let new = || Compensator::new(compensation, plane, ends_perpendicular);
-        let result = self.contour.compensator.get_or_insert_with(new).push(motion, &mut self.contour.out);
+        let compensator = self.contour.compensator.get_or_insert_with(new);
+        compensator.has_intersections = self.contour.has_intersections;
+        compensator.goes_around = self.contour.goes_around;
+        let result = compensator.push(motion, &mut self.contour.out);
         self.steps.extend(self.contour.out.drain(..));
         result
     }

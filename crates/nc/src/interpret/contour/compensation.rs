@@ -4,7 +4,7 @@
 //! in LinuxCNC the first motion ends perpendicular to itself at the contour; as on other controls perpendicular to the
 //! motion that follows. The motion after the end of compensation leaves from the last point of the parallel.
 
-use virtual_axes_core::units::{MILLIMETER, Rounded};
+use virtual_axes_core::units::{DEGREE, MILLIMETER, Rounded};
 
 use super::corner::{normal, turn_to};
 use super::piece::{ContourPiece, Point, SAME, angle};
@@ -13,6 +13,9 @@ use crate::motion::{Feed, MotionKind, PlanarArc, Plane, ProgramMotion, ProgramSt
 
 /// Sine of the angle between two motions below which they are tangent.
 const TANGENT: f64 = 1e-6;
+
+/// Turn from which G451 passes an outside corner on an arc: default of the machine data 20210, rad.
+const POINTED: f64 = 100.0 * DEGREE;
 
 /// Cutter radius compensation in effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,6 +34,10 @@ pub(in crate::interpret) struct Compensator {
     plane: Plane,
     /// True if the first motion ends perpendicular to itself, as in LinuxCNC.
     ends_perpendicular: bool,
+    /// True if outside corners are intersections of the parallels (G451).
+    pub has_intersections: bool,
+    /// True if the tool goes around the start of the contour (KONT).
+    pub goes_around: bool,
     last: Option<Last>,
 }
 
@@ -56,7 +63,15 @@ impl Compensator {
     ) -> Self {
         let Compensation { is_left, radius } = compensation;
         let is_left = is_left == (radius >= 0.0);
-        Self { is_left, radius: radius.abs(), plane, ends_perpendicular, last: None }
+        Self {
+            is_left,
+            radius: radius.abs(),
+            plane,
+            ends_perpendicular,
+            has_intersections: false,
+            goes_around: false,
+            last: None,
+        }
     }
 
     /// Returns true if steps wait for the next motion.
@@ -95,17 +110,22 @@ impl Compensator {
         let turn = turn_to(leave, enter, self.is_left);
         if last.is_first && !self.ends_perpendicular {
             // The lead-in ends perpendicular to the contour.
+            if self.goes_around {
+                require_in_front((last.contour.end - last.contour.start).dot(&enter))?;
+            }
             last.path.end = path.start;
             self.finish(last, out);
         } else if turn.abs() < TANGENT && leave.dot(&enter) > 0.0 {
             path.start = last.path.end;
             self.finish(last, out);
-        } else if turn < 0.0 {
+        } else if turn < 0.0 && !self.meets(&mut last, &mut path, corner) {
             let (from, to) = (last.path.end, path.start);
             self.finish(last, out);
             out.push(ProgramStep::Motion(self.around(&motion, out, [from, to, corner])));
         } else {
-            self.inside(&mut last, &mut path, corner, motion.line)?;
+            if turn > 0.0 {
+                self.inside(&mut last, &mut path, corner, motion.line)?;
+            }
             self.finish(last, out);
         }
         let (is_first, after) = (false, Vec::new());
@@ -113,12 +133,13 @@ impl Compensator {
         Ok(())
     }
 
-    /// Ends the compensation: appends the steps that wait. Returns the tool center, where the next motion begins.
-    pub(in crate::interpret) fn end(&mut self, out: &mut Vec<ProgramStep>) -> Option<Point> {
+    /// Ends the compensation: appends the steps that wait. Returns the tool center, where the next motion begins, and the
+    /// direction of the contour there.
+    pub(in crate::interpret) fn end(&mut self, out: &mut Vec<ProgramStep>) -> Option<(Point, Point)> {
         let last = self.last.take()?;
-        let center = last.path.end;
+        let (center, direction) = (last.path.end, last.contour.tangent(true));
         self.finish(last, out);
-        Some(center)
+        Some((center, direction))
     }
 
     fn enter(
@@ -181,6 +202,22 @@ impl Compensator {
                 .map(|length| Rounded(length / MILLIMETER));
             format!("the tool radius of {tool} mm does not fit into the arc of radius {arc} mm")
         })
+    }
+
+    /// Ends and begins two parallels at their intersection outside of a corner (G451). Returns false without an intersection
+    /// and at a pointed corner, which the tool passes on an arc.
+    fn meets(&self, last: &mut Last, path: &mut ContourPiece, corner: Point) -> bool {
+        let turn = angle(last.contour.tangent(true), path.tangent(false));
+        if !self.has_intersections || turn.abs() > POINTED {
+            return false;
+        }
+        let (mut before, mut after) = (last.path, *path);
+        let Some(point) = before.intersection(&after, corner) else { return false };
+        let is_found = before.move_to(point, true) && after.move_to(point, false);
+        if is_found {
+            (last.path, *path) = (before, after);
+        }
+        is_found
     }
 
     /// Returns the motion around an outside corner.
@@ -260,4 +297,13 @@ impl Compensator {
             event => event,
         }));
     }
+}
+
+/// Rejects a start or end of compensation with KONT behind the contour, by the way along the direction of the contour, m.
+pub(in crate::interpret) fn require_in_front(way: f64) -> Outcome<()> {
+    if way > -SAME {
+        return Ok(());
+    }
+    Err("KONT with a start or end behind the contour is not supported: program NORM, or a start or end in front of it"
+        .to_owned())
 }

@@ -5,7 +5,7 @@ mod compensation;
 mod corner;
 mod piece;
 
-pub(super) use compensation::{Compensation, Compensator};
+pub(super) use compensation::{Compensation, Compensator, require_in_front};
 pub(super) use corner::Corner;
 pub(super) use piece::{ContourPiece, Point, SAME};
 
@@ -21,5 +21,11 @@ pub(super) struct Contour {
     pub(super) compensation: Option<(Compensation, Plane)>,
     /// Tool center at the end of compensation, where the next motion begins.
     pub(super) leave: Option<(Point, Plane)>,
+    /// Direction of the contour at the end of compensation, from which KONT must lead away.
+    pub(super) leave_direction: Option<Point>,
+    /// True if outside corners are intersections of the parallels (G451).
+    pub(super) has_intersections: bool,
+    /// True if the tool goes around the ends of the contour (KONT).
+    pub(super) goes_around: bool,
     pub(super) out: Vec<ProgramStep>,
 }

@@ -112,7 +112,11 @@ impl Sinumerik {
         let of = |axis: usize| values[axis].unwrap_or(0.0);
         let inner = match operation.kind {
             FrameKind::Translation => {
-                AxisFrame::translation(std::array::from_fn(|axis| of(axis) * state.unit(axis)))
+                let offset = std::array::from_fn(|axis| of(axis) * state.unit(axis));
+                match operation.is_additive {
+                    true => AxisFrame { fine: offset, ..AxisFrame::default() },
+                    false => AxisFrame::translation(offset),
+                }
             }
             FrameKind::Rotation => match words.number("RPL")? {
                 Some(angle) => AxisFrame::about(state.modal.plane.axes()[2], angle * DEGREE),

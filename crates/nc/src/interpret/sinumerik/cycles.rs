@@ -80,6 +80,12 @@ impl DrillingCycle {
             (Some(bottom), None) => bottom * values.length,
             (None, None) => return Err(format!("{name} requires DP or DPR, its value 4 or 5: the depth")),
         };
+        if matches!(name, "CYCLE81" | "CYCLE82") && values.get(6)?.is_some_and(|mode| mode != 0.0) {
+            return Err(format!(
+                "{name}: _GMODE, its value 7, is not supported above 0 (depth of the shank, diameter of the centering): \
+                 program the depth of the tip"
+            ));
+        }
         if down * (bottom - start) < 0.0 {
             return Err(format!("{name}: the depth is above the reference plane"));
         }

@@ -413,6 +413,11 @@ impl Sinumerik {
             // Pitch and start angle of a thread belong to its code.
             ["I", "J", "K", "SF"].into_iter().for_each(|name| drop(words.take(name)));
         }
+        if words.g.iter().any(|code| matches!(code, 158 | 258 | 259)) {
+            // Shift and angle belong to the code.
+            words.take("RPL");
+            words.axes = [None; AXIS_COUNT];
+        }
         words.g.retain(is_known);
         Ok(())
     }

@@ -10,9 +10,9 @@ use crate::motion::{AXIS_COUNT, Coordinates};
 pub(super) struct AxisFrame {
     /// Rotation, scaling and mirroring of X, Y and Z.
     pub linear: Matrix3<f64>,
-    /// Translation (TRANS, ATRANS, G58).
+    /// Coarse translation (TRANS, G58).
     pub offset: Coordinates,
-    /// Fine translation (G59).
+    /// Fine translation (ATRANS, G59).
     pub fine: Coordinates,
 }
 
@@ -51,12 +51,13 @@ impl AxisFrame {
     /// Returns the chain of this frame and one in its coordinates.
     #[must_use]
     pub(super) fn then(&self, inner: &Self) -> Self {
-        let mut offset = self.total();
-        let moved = self.linear * linear_part(&inner.total());
-        for (axis, offset) in offset.iter_mut().enumerate() {
-            *offset += if axis < 3 { moved[axis] } else { inner.total()[axis] };
-        }
-        Self { linear: self.linear * inner.linear, offset, fine: [0.0; AXIS_COUNT] }
+        let chained = |outer: &Coordinates, inner: &Coordinates| {
+            let moved = self.linear * linear_part(inner);
+            std::array::from_fn(|axis| outer[axis] + if axis < 3 { moved[axis] } else { inner[axis] })
+        };
+        let [offset, fine] = [(&self.offset, &inner.offset), (&self.fine, &inner.fine)]
+            .map(|(outer, inner)| chained(outer, inner));
+        Self { linear: self.linear * inner.linear, offset, fine }
     }
 
     /// Returns the translation with its fine part, m and rad.

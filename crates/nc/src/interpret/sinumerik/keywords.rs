@@ -38,10 +38,6 @@ const ACCEPTED: &[&str] = &[
     "SPATH",
     "CP",
     // Compensation and orientation details.
-    "NORM",
-    "KONT",
-    "KONTC",
-    "KONTT",
     "CUT2D",
     "CUT2DF",
     "CUT2DD",
@@ -167,7 +163,6 @@ const ACCEPTED: &[&str] = &[
     "FRCM",
     "FZ",
     "STOLF",
-    "DISC",
     "SF",
     "LIMS",
     "SVC",
@@ -188,8 +183,8 @@ const ACCEPTED: &[&str] = &[
 
 /// G codes without effect on the path.
 const ACCEPTED_G: &[u32] = &[
-    62, 290, 450, 451, 460, 461, 462, 601, 602, 603, 621, 810, 811, 812, 813, 814, 815, 816, 817, 818, 819,
-    820, 821, 822, 823, 824, 825, 826, 827, 828, 829, 930, 931,
+    62, 290, 460, 461, 462, 601, 602, 603, 621, 810, 811, 812, 813, 814, 815, 816, 817, 818, 819, 820, 821,
+    822, 823, 824, 825, 826, 827, 828, 829, 930, 931,
 ];
 
 /// Words that change the geometry, with what to do.
@@ -222,6 +217,8 @@ const REJECTED: &[(&str, &str)] = &[
     ("CUT3DC", "post the path of the tool center (CUT2D), or program G40"),
     ("CUT3DF", "post the path of the tool center (CUT2D), or program G40"),
     ("CUT3DFF", "post the path of the tool center (CUT2D), or program G40"),
+    ("KONTC", "program NORM, and an approach by lines and arcs"),
+    ("KONTT", "program NORM, and an approach by lines and arcs"),
     ("LEAD", "post the direction A3= B3= C3= or the rotary axes"),
     ("TILT", "post the direction A3= B3= C3= or the rotary axes"),
     ("THETA", "remove the rotation of the tool about itself"),
@@ -318,7 +315,7 @@ pub(super) fn is_executed_g(code: u32) -> bool {
     matches!(
         code,
         0..=4 | 9 | 17..=19 | 25 | 26 | 40..=42 | 53..=60 | 63 | 64 | 70 | 71 | 74 | 75 | 90 | 91 | 93..=97
-            | 110..=112 | 140 | 147 | 148 | 153 | 247 | 248 | 331 | 332 | 340 | 341 | 347 | 348 | 500 | 505..=599 | 641..=645 | 700 | 710 | 961 | 962 | 971..=973
+            | 110..=112 | 140 | 147 | 148 | 153 | 247 | 248 | 331 | 332 | 340 | 341 | 347 | 348 | 450 | 451 | 500 | 505..=599 | 641..=645 | 700 | 710 | 961 | 962 | 971..=973
     )
 }
 
@@ -341,6 +338,9 @@ pub(super) fn g_remedy(code: u32) -> &'static str {
         33..=35 | 335 | 336 => "threads are cut on a lathe: program G331 or CYCLE84",
         141..=143 => "the side of the approach is that of the compensation: program G140",
         291 => "the ISO mode is read with --dialect fanuc: give the program without G290 and G291",
+        158 | 258 | 259 => {
+            "of 802S and 802C: program TRANS X Y Z in place of G158, ROT RPL= of G258 and AROT RPL= of G259"
+        }
         5 | 7 => "inclined axes are not supported",
         _ => "no such G code of this control, or none for milling",
     }

@@ -7,6 +7,7 @@ use super::super::error::Outcome;
 use super::super::limits::MAX_RATE;
 use super::super::state::State;
 use super::Sinumerik;
+use super::execute::reject;
 use super::modes::{PathMode, active_tool};
 use super::words::Words;
 
@@ -44,7 +45,25 @@ impl Sinumerik {
         Ok(())
     }
 
+    /// Sets outside corners, start and end of compensation: G450, G451, DISC, NORM, KONT.
+    fn set_corners(&self, words: &mut Words, state: &mut State) -> Outcome<()> {
+        if let Some(code) = words.take_group(&[450, 451])? {
+            state.contour.has_intersections = code == 451;
+        }
+        if words.number("DISC")?.is_some_and(|share| share > 0.0) {
+            return reject("DISC above 0", "program DISC=0, or G451", state);
+        }
+        if words.take_keyword("KONT") {
+            state.contour.goes_around = true;
+        }
+        if words.take_keyword("NORM") {
+            state.contour.goes_around = false;
+        }
+        Ok(())
+    }
+
     pub(super) fn set_compensation(&mut self, words: &mut Words, state: &mut State) -> Outcome<()> {
+        self.set_corners(words, state)?;
         let offset = words.number("OFFN")?.map_or(0.0, |offset| offset * state.modal.length);
         match words.take_group(&[40, 41, 42])? {
             None => Ok(()),

@@ -15,10 +15,10 @@ use super::{Sinumerik, keywords};
 use crate::motion::ProgramEvent;
 
 /// Addresses of several letters that have a meaning here or a remedy.
-const ADDRESSES: [&str; 42] = [
+const ADDRESSES: [&str; 43] = [
     "CR", "AR", "AP", "RP", "RPL", "TURN", "RND", "RNDM", "CHF", "CHR", "ANG", "ADIS", "ADISPOS", "CTOL",
     "OTOL", "OFFN", "A2", "B2", "C2", "A3", "B3", "C3", "A4", "B4", "C4", "A5", "B5", "C5", "I1", "J1", "K1",
-    "LEAD", "TILT", "THETA", "A6", "B6", "C6", "FB", "FP", "DISR", "DISCL", "FAD",
+    "LEAD", "TILT", "THETA", "A6", "B6", "C6", "FB", "FP", "DISR", "DISCL", "FAD", "DISC",
 ];
 
 /// Returns true for a letter with digits, which is no name of a subprogram: `M30`, not `L30`.
@@ -152,6 +152,12 @@ impl Sinumerik {
             match name {
                 "MCALL" => is_modal = true,
                 "MSG" => self.message(scanner, state)?,
+                "CALL" if scanner.peek_name() == "BLOCK" => {
+                    return Err(
+                        "CALL BLOCK … TO … is not supported: program REPEAT with the labels, as in REPEAT A1 A2"
+                            .to_owned(),
+                    );
+                }
                 "CALL" | "EXTCALL" | "PCALL" => {
                     invocation = Some(self.indirect_call(name, scanner, state)?);
                 }
@@ -292,6 +298,8 @@ fn is_keyword(name: &str) -> bool {
         name,
         "SUPA"
             | "CIP"
+            | "NORM"
+            | "KONT"
             | "CT"
             | "RET"
             | "ENDPROC"

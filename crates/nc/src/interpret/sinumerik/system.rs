@@ -84,7 +84,12 @@ impl NameScope<'_> {
             "$P_PFRAME" | "$P_ACTFRAME" if indices.is_empty() => {
                 Ok(ProgramValue::CoordinateFrame(Box::new(self.modes.frame)))
             }
-            "$P_PFRAME" => component(&self.modes.frame.total(), indices),
+            "$P_PFRAME" => match indices {
+                [ProgramValue::Axis(axis), ProgramValue::Text(component)] if component == "FI" => {
+                    number(self.modes.frame.fine[*axis] / unit(*axis))
+                }
+                _ => component(&self.modes.frame.offset, indices),
+            },
             "$P_F" => number(state.modal.feed_word),
             "$P_S" | "$AA_S" => number(state.modal.spindle_speed),
             "$P_SDIR" => number(match state.modal.spindle_direction {

@@ -92,6 +92,11 @@ impl Words {
         if !negative {
             ahead.skip("+");
         }
+        let variable = ahead.peek_name();
+        if variable.starts_with('R') {
+            let (letter, sign) = (&name[..1], if negative { "-" } else { "" });
+            return Err(format!("word {letter}: an expression requires =, as in {letter}={sign}{variable}"));
+        }
         let number = ahead.number().map_err(|reason| format!("word {}: {reason}", &name[..1]))?;
         let value = if negative { -number } else { number };
         *scanner = ahead;
