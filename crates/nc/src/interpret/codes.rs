@@ -296,7 +296,6 @@ const WITHOUT_EFFECT: &[(u16, u8, &str)] = &[
     (260, FH, "PQRI"),
     (290, MARLIN, "ABDEFHIJKLPQRSTUVWXY"),
     (291, FH | NGC, ""),
-    (350, HAAS, ""),
     (401, FH, ""),
     // PathPilot ends the scaling that no program of this dialect begins.
     (500, LINUXCNC, ""),
@@ -344,6 +343,9 @@ const REMEDIES: &[(u16, &str)] = &[
         880,
         "LinuxCNC leaves the motion of G88 undefined: program G0 and G1, or G88 in --dialect fanuc, haas, mach3 or okuma",
     ),
+    (350, "measuring of a tool, whose motions are not simulated: remove it"),
+    (360, "measuring of a work offset, whose motions are not simulated: set it with G10 L2"),
+    (370, "measuring of a tool, whose motions are not simulated: remove it"),
     (470, "engraving of text: let the CAM system output the motions"),
     (760, "threading on a lathe: no axis of the machine turns the workpiece"),
     (1000, "the end of mirroring on Haas; of Brother, a tool change with motions: program T, M6 and G0"),

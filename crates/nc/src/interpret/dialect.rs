@@ -8,12 +8,9 @@ use std::str::FromStr;
 
 use virtual_axes_core::encoding::TextEncoding;
 
-use super::encoding::read_line;
+use super::encoding::{LINE_BYTES, SEARCHED_BYTES, read_line};
+use super::foreign::foreign_format;
 
-/// Bytes at the start of a program in which its dialect is detected.
-const DETECTION_BYTES: usize = 1 << 20;
-/// Longest line in which evidence is searched, bytes.
-const LINE_BYTES: usize = 4096;
 /// Points from which a dialect is detected.
 const ENOUGH: u32 = 3;
 
@@ -143,7 +140,7 @@ impl DetectedDialect {
         for number in 1.. {
             let read = read_line(encoding, source, LINE_BYTES, &mut line).unwrap_or(0);
             bytes += read;
-            if read == 0 || bytes > DETECTION_BYTES {
+            if read == 0 || bytes > SEARCHED_BYTES {
                 break;
             }
             let text = String::from_utf8_lossy(&line).trim().to_ascii_uppercase();
@@ -192,22 +189,6 @@ pub(super) fn is_word_line(line: &str) -> bool {
     let mut letters = code.trim_start_matches('/').chars();
     letters.next().is_some_and(|letter| "GMNXYZTFSO#:".contains(letter))
         && letters.next().is_some_and(|next| next.is_ascii_digit() || "+-.<[=".contains(next))
-}
-
-/// Returns the name of the format that a line in upper case shows, if it is no G code of a supported dialect.
-pub(super) fn foreign_format(line: &str) -> Option<&'static str> {
-    const APT: [&str; 8] =
-        ["PARTNO", "TOOL PATH/", "MULTAX/", "LOADTL/", "CUTTER/", "GOTO/", "MACHIN/", "TLDATA/"];
-    let text = line.trim_start_matches(|letter: char| letter.is_ascii_digit() || letter == ' ');
-    if ["BEGIN PGM", "BLK FORM", "TOOL CALL", "CYCL DEF"].iter().any(|word| text.starts_with(word)) {
-        return Some("a conversational program of Heidenhain (Klartext)");
-    }
-    if APT.iter().any(|word| text.starts_with(word)) {
-        return Some("a cutter location file (APT, CLS)");
-    }
-    let is_iso =
-        line.starts_with('%') && line.ends_with('*') && (line.contains(" G71") || line.contains(" G70"));
-    is_iso.then_some("a program of Heidenhain in DIN/ISO")
 }
 
 /// Evidence for one dialect.
@@ -385,6 +366,10 @@ const RULES: &[(u8, u32, Pattern)] = &[
     (SINUMERIK, 6, Code("ORIWKS")),
     (SINUMERIK, 6, Code("POCKET")),
     (SINUMERIK, 6, Code("HOLES")),
+    // Steps of ShopMill.
+    (SINUMERIK, 12, Start("E_HEAD(")),
+    (SINUMERIK, 12, Start("F_HEAD(")),
+    (SINUMERIK, 6, Code("F_ROUGH(")),
     (SINUMERIK, 6, Comment("SINUMERIK")),
     (SINUMERIK, 6, Comment("SIEMENS")),
     (GRBL, 6, Command),

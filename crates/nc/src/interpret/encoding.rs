@@ -4,6 +4,11 @@ use std::io::{self, BufRead};
 
 use virtual_axes_core::encoding::TextEncoding;
 
+/// Bytes at the start of a program in which the words of a dialect, of turning and of other controls are searched.
+pub(super) const SEARCHED_BYTES: usize = 1 << 20;
+/// Longest line in which they are searched, bytes.
+pub(super) const LINE_BYTES: usize = 4096;
+
 /// Reads a line without its end: CR, LF or both; of a longer one than `limit`, its start. Returns the number of bytes,
 /// 0 at the end of the file. Control characters other than the tab are omitted.
 pub(crate) fn read_line(

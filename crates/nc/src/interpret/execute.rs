@@ -208,6 +208,15 @@ impl State {
             None => {}
         }
         self.modal.spindle_speed = speed.unwrap_or(self.modal.spindle_speed);
+        if let Some(tool) =
+            block.get('T').filter(|tool| tool.fract() != 0.0 && self.dialect == Dialect::Fanuc)
+        {
+            self.assume(format!(
+                "word T{tool}: tool {}, the digits after the point have no effect",
+                tool.trunc()
+            ));
+            block.truncate('T');
+        }
         if let Some(tool) = block.take_integer('T')? {
             self.modal.selected_tool = tool;
             self.push_event(ProgramEvent::ToolSelection(tool));

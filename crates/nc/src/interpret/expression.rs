@@ -333,13 +333,20 @@ impl<'a> Scanner<'a> {
             }
             self.at = start;
             let [y, x] = self.two_values("ATAN")?;
-            return Ok(y.atan2(x).to_degrees());
+            return Ok(self.whole_turn(y.atan2(x)));
         }
         let y = y?;
         if !self.skip("/") {
             return Err("ATAN: a second value is required, ATAN[y]/[x]".to_owned());
         }
-        Ok(y.atan2(self.bracket()?).to_degrees())
+        let x = self.bracket()?;
+        Ok(self.whole_turn(y.atan2(x)))
+    }
+
+    /// Returns an angle in degrees: 0 to 360 of Fanuc (parameter 6004#0 is 0), −180 to 180 of other controls.
+    fn whole_turn(&self, angle: f64) -> f64 {
+        let degrees = angle.to_degrees();
+        if self.state.dialect == Dialect::Fanuc && degrees < 0.0 { degrees + 360.0 } else { degrees }
     }
 
     /// Reads two values in brackets with a comma.

@@ -231,6 +231,12 @@ impl LineWords {
         value
     }
 
+    /// Removes the fraction of a word. `letter` is in upper case.
+    pub(super) fn truncate(&mut self, letter: char) {
+        let value = &mut self.values[index(letter as u8)];
+        *value = value.trunc();
+    }
+
     /// Returns the value of a word that must be 0 or positive, which then counts as used.
     pub(super) fn take_rate(&mut self, letter: char) -> Outcome<Option<f64>> {
         match self.take(letter) {

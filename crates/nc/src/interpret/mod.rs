@@ -18,6 +18,7 @@ mod execute;
 mod expression;
 mod files;
 mod flow;
+mod foreign;
 mod frame;
 mod frames;
 mod ignored;
@@ -65,6 +66,7 @@ pub use work_offset::system_name;
 
 use self::control_variables::ALARM;
 use self::error::Outcome;
+use self::foreign::ForeignWord;
 use self::line_words::{LineWords, Setting};
 use self::o_words::{Flow, is_o_word};
 use self::parameters::LOCALS;
@@ -101,6 +103,10 @@ impl<R: BufRead + Seek> Interpreter<R> {
             Some(dialect) => DetectedDialect { dialect, evidence: None },
             None => DetectedDialect::of(&mut source, name),
         };
+        let foreign = foreign.or_else(|| {
+            let word = ForeignWord::of(&mut source)?;
+            Some((word.line, foreign_reason(word.format)))
+        });
         let turning = || TurningWord::of(&mut source, dialect.dialect).map(turning_reason);
         let foreign = foreign.or_else(turning);
         let has_given_dialect = options.dialect.replace(dialect.dialect).is_some();

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use virtual_axes_core::units::{DEGREE, MINUTE, RPM};
 
 use super::codes::{FeedMode, Motion, g_name};
+use super::cycles::is_canned;
 use super::dialect::Dialect;
 use super::error::Outcome;
 use super::frames::SCALING;
@@ -33,7 +34,9 @@ impl State {
         is_machine: bool,
     ) -> Outcome<()> {
         let is_arc = matches!(self.modal.motion, Some(Motion::ClockwiseArc | Motion::CounterclockwiseArc));
+        let is_cycle = self.modal.motion.is_some_and(is_canned) && self.dialect == Dialect::Fanuc;
         let has_words = block.has_axis()
+            || (is_cycle && block.has_any(&['R']))
             || (is_arc && block.has_any(&['I', 'J', 'K', 'R']))
             || (self.modal.has_tool_vectors && block.has_any(&['I', 'J', 'K']));
         if motion.is_none() && !has_words && !is_machine {
@@ -182,7 +185,8 @@ impl State {
         code: Motion,
         motion: impl FnOnce(&mut Self) -> Outcome<()>,
     ) -> Outcome<()> {
-        block.skip("PQ");
+        // R of Mitsubishi selects the acceleration.
+        block.skip("PQR");
         let name = g_name(code.number());
         self.assume(format!("{name}: a straight line to its end, nothing is touched"));
         motion(self)?;

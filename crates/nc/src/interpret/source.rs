@@ -4,9 +4,10 @@ use std::io::{BufRead, Cursor, Seek, SeekFrom};
 
 use virtual_axes_core::encoding::TextEncoding;
 
-use super::dialect::{foreign_format, is_word_line};
+use super::dialect::is_word_line;
 use super::encoding::read_line;
 use super::error::Outcome;
+use super::foreign::foreign_format;
 use super::limits::{MAX_IDLE_LINES, MAX_LINE};
 
 /// Largest number of files of subprograms.

@@ -5,12 +5,8 @@ use std::io::{BufRead, Seek, SeekFrom};
 use virtual_axes_core::encoding::TextEncoding;
 
 use super::dialect::{Dialect, code_of, has_word};
-use super::encoding::read_line;
+use super::encoding::{LINE_BYTES, SEARCHED_BYTES, read_line};
 
-/// Bytes at the start of a program in which the words are searched.
-const SEARCHED_BYTES: usize = 1 << 20;
-/// Longest line in which they are searched, bytes.
-const LINE_BYTES: usize = 4096;
 /// Points from which a program is one for turning.
 const ENOUGH: u32 = 4;
 /// Canned cycles for holes.

@@ -106,6 +106,42 @@ fn other_formats_are_named_in_one_error() {
 }
 
 #[test]
+fn words_of_other_controls_are_named_in_one_error() {
+    for (text, line, format) in [
+        (
+            "G21 G90\nG0 X0\nIF [#100 == 5] THEN\nG0 X5\nENDIF\n",
+            3,
+            "a program of EdingCNC with SUB, IF or WHILE",
+        ),
+        ("G21\nGOSUB POCKET\n", 2, "a program of EdingCNC with SUB, IF or WHILE"),
+        ("G21\nG1 X{5+5} F100\n", 2, "a program of RepRapFirmware with expressions or conditions"),
+        (
+            "M106 S255\nwhile iterations < 3\n",
+            2,
+            "a program of RepRapFirmware with expressions or conditions",
+        ),
+        ("%L UP\nN10 $IF V.P.A == 1\nN20 $ENDIF\n", 2, "a program of ISG (TwinCAT CNC)"),
+        ("N10 G0 X0\n#VAR\n", 2, "a program of ISG (TwinCAT CNC)"),
+        ("(PGM, NAME=\"PART\")\nG0 X0\n", 1, "a program of Acramatic"),
+        ("G90\nRAPID X0 Y0 Z1\n", 2, "a conversational program of Anilam"),
+    ] {
+        let options = InterpreterOptions { reports_all_errors: true, ..InterpreterOptions::default() };
+        let error = steps(text, options).expect_err(text).to_string();
+        let expected = format!("part.nc:{line}: {format} is not supported: post the program again as G code");
+        assert!(error.starts_with(&expected), "{text:?}: {error}");
+    }
+    // Words of supported controls.
+    for (text, dialect) in [
+        ("IF [#1 EQ #0] THEN #1=0\nG0 X1.\nM30\n", Dialect::Fanuc),
+        ("G0 X1 (TEXT X{5})\nM2\n", Dialect::LinuxCnc),
+        ("G0 R1=0\nWHILE R1<2\nR1=R1+1\nX=R1\nENDWHILE\nM30\n", Dialect::Sinumerik),
+    ] {
+        let options = InterpreterOptions { dialect: Some(dialect), ..InterpreterOptions::default() };
+        assert!(steps(text, options).is_ok(), "{text}");
+    }
+}
+
+#[test]
 fn motions_after_a_missing_feed_start_at_its_end() {
     let text = "G21 G90 G17 G0 X0 Y0\nG1 X10\nG2 X20 Y10 R10\nG2 X30 Y0 I0 J-10\nM2\n";
     let errors = report(text, Dialect::LinuxCnc).errors;

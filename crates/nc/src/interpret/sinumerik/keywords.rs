@@ -237,6 +237,14 @@ const REJECTED: &[(&str, &str)] = &[
     ("ORICONIO", VECTORS),
     ("ORICONTO", VECTORS),
     ("ORIROTA", VECTORS),
+    ("LCYC60", LCYC),
+    ("LCYC61", LCYC),
+    ("LCYC75", LCYC),
+    ("LCYC82", LCYC),
+    ("LCYC83", LCYC),
+    ("LCYC84", LCYC),
+    ("LCYC840", LCYC),
+    ("LCYC85", LCYC),
     ("E_HEAD", SHOP),
     ("F_HEAD", SHOP),
     ("PTP", "program G0 without TRAORI"),
@@ -266,6 +274,7 @@ const REJECTED: &[(&str, &str)] = &[
     ("PUNCHACC", "punching is not simulated"),
 ];
 const SPLINES: &str = "post lines and arcs in place of splines and polynomials";
+const LCYC: &str = "a cycle of 802S and 802C with values in R parameters: program CYCLE82, CYCLE83, CYCLE84, CYCLE840, CYCLE85 or HOLES1";
 const SHOP: &str =
     "a program of steps of ShopMill or ShopTurn: convert it to G code in the control, or post it again";
 const FRAMES: &str = "program TRANS, ROT or CYCLE800";
