@@ -115,15 +115,21 @@ impl State {
 
         let is_okuma = self.dialect == Dialect::Okuma;
         let to_initial = self.modal.retracts_to_initial && !is_okuma;
-        // LinuxCNC rises to the initial level on the way to the hole, other controls cross at the present one.
-        let mut level =
-            if to_initial && is_linuxcnc { cycle.initial.max(start[drill]) } else { start[drill] };
         let is_below = is_back_boring(code);
-        if level < levels.retract && !is_below {
-            level = levels.retract;
-            if repeats > 0 {
-                self.rapid_along(drill, level)?;
-            }
+        let is_above = start[drill] > levels.retract;
+        let rises = match is_linuxcnc {
+            // LinuxCNC compares the plane R with the initial level.
+            true => cycle.initial < levels.retract,
+            false => start[drill] < levels.retract && !is_below,
+        };
+        // From the plane R, LinuxCNC rises to the level of retraction on the way to the hole.
+        let level = match rises || (is_linuxcnc && !is_above) {
+            true if is_linuxcnc && to_initial => cycle.initial.max(levels.retract),
+            true => levels.retract,
+            false => start[drill],
+        };
+        if rises && repeats > 0 {
+            self.rapid_along(drill, level)?;
         }
         let path_control = std::mem::replace(&mut self.modal.path_control, PathControl::ExactPath);
         let clear = match self.modal.return_level {
