@@ -217,6 +217,13 @@ impl State {
             ));
             block.truncate('T');
         }
+        if let Some(tool) = block.get('T').filter(|tool| tool.fract() != 0.0) {
+            return Err(format!(
+                "word T: {tool} is a tool with an offset, as Fagor and Mazak have it: program T{}, or give --dialect fanuc \
+                 for Mazak",
+                tool.trunc()
+            ));
+        }
         if let Some(tool) = block.take_integer('T')? {
             self.modal.selected_tool = tool;
             self.push_event(ProgramEvent::ToolSelection(tool));

@@ -319,6 +319,7 @@ impl<'a> Scanner<'a> {
         };
         match function(if value.is_nan() { 0.0 } else { value }) {
             result if result.is_nan() => Err(format!("{}[{value}]: must be {range}", name.to_uppercase())),
+            result if name == "asin" => Ok(self.whole_turn(result)),
             result => Ok(result),
         }
     }
@@ -333,19 +334,18 @@ impl<'a> Scanner<'a> {
             }
             self.at = start;
             let [y, x] = self.two_values("ATAN")?;
-            return Ok(self.whole_turn(y.atan2(x)));
+            return Ok(self.whole_turn(y.atan2(x).to_degrees()));
         }
         let y = y?;
         if !self.skip("/") {
             return Err("ATAN: a second value is required, ATAN[y]/[x]".to_owned());
         }
         let x = self.bracket()?;
-        Ok(self.whole_turn(y.atan2(x)))
+        Ok(self.whole_turn(y.atan2(x).to_degrees()))
     }
 
-    /// Returns an angle in degrees: 0 to 360 of Fanuc (parameter 6004#0 is 0), −180 to 180 of other controls.
-    fn whole_turn(&self, angle: f64) -> f64 {
-        let degrees = angle.to_degrees();
+    /// Returns an angle in degrees: 0 to 360 of Fanuc (parameter 6004#0 is 0), −180 to 180 of others.
+    fn whole_turn(&self, degrees: f64) -> f64 {
         if self.state.dialect == Dialect::Fanuc && degrees < 0.0 { degrees + 360.0 } else { degrees }
     }
 

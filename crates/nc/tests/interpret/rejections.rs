@@ -78,7 +78,7 @@ fn invalid_words_are_rejected_with_their_line() {
             "part.nc:1: G95 (feed per revolution) requires a turning spindle: program S with M3 or M4",
         ),
         ("F-5", "part.nc:1: word F: -5 is invalid, must be between 0 and 1e9"),
-        ("T1.5", "part.nc:1: word T: 1.5 is invalid, an integer from 0 is required"),
+        ("T1.5", "part.nc:1: word T: 1.5 is a tool with an offset, as Fagor and Mazak have it: program T1"),
         ("G4", "part.nc:1: G4 requires P, the dwell in s"),
         ("G91 G53 G0 X1", "part.nc:1: G53 requires G90 with G0 or G1"),
         ("G92", "part.nc:1: G92 requires at least one axis word"),
