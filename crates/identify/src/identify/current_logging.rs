@@ -11,9 +11,8 @@ use super::moving_data::{CurrentRipple, MovingData, RIPPLE, Sample, law_of};
 use crate::recording::{GaussianFilter, Signals};
 
 /// Factor of the variance of the noise by which the costs of the ways are compared, since the simulated ripples have errors of
-/// the model: with a known phase of the samples, and with an unknown one.
-const KNOWN_PHASE: f64 = 4.0;
-const UNKNOWN_PHASE: f64 = 16.0;
+/// the model.
+const MODEL_ERROR: f64 = 16.0;
 /// Passes of a comparison, whose prior depends on the inertia.
 const LINEAR_PASSES: usize = 3;
 
@@ -39,8 +38,6 @@ pub(super) struct CurrentLoggings {
     pub instants: Vec<LoggedInstant>,
     /// Relative standard error of the simulated ripple.
     pub error: f64,
-    /// True if the phase of the samples in the position cycles is known. Otherwise differences of the costs count less.
-    pub is_phase_known: bool,
     /// True if the loop is the identified one: a ripple of another size than the simulated one then leaves values in doubt.
     pub is_of_identified_loop: bool,
 }
@@ -165,7 +162,7 @@ impl MovingData {
         }
         let least = compared.iter().map(|(_, _, cost)| *cost).fold(f64::INFINITY, f64::min);
         let of_instants: f64 = loggings.instants.iter().map(|instant| instant.prior).sum();
-        let variance = noise * noise * if loggings.is_phase_known { KNOWN_PHASE } else { UNKNOWN_PHASE };
+        let variance = MODEL_ERROR * noise * noise;
         let weight = |(way, _, cost): &(Option<usize>, DVector<f64>, f64)| {
             let prior = way.map_or(1.0 - of_instants, |k| loggings.instants[k].prior);
             prior * (-0.5 * (cost - least) / variance).exp()

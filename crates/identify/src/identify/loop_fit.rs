@@ -52,6 +52,13 @@ impl LoopProblem<'_> {
         rms(left.iter().take(data).copied())
     }
 
+    /// Returns the position-loop gain of a minimum, s⁻¹; that of `axis` if it is not fitted.
+    pub fn gain_of(&self, axis: &AxisConfig, minimum: &LoopMinimum) -> f64 {
+        let parameters = self.parameters(axis);
+        let gain = parameters.iter().zip(&minimum.values).find(|(p, _)| **p == LoopParameter::Gain);
+        gain.map_or(axis.position_loop.gain, |(_, gain)| *gain)
+    }
+
     /// Returns the minimum with torque feedforward next to the minimum `from` without it.
     pub fn with_torque(
         &self,

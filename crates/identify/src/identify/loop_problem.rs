@@ -12,7 +12,6 @@ use super::experiment::{CurrentLogging, Experiment};
 use super::feedforward_mode::FeedforwardMode;
 use super::fit::BoundedParameter;
 use super::loop_parameter::{LoopParameter, apply, prior};
-use super::loop_search::LoopMinimum;
 use super::resample::interpolation_error;
 use super::trace_experiments::trace_experiments;
 use crate::recording::Signals;
@@ -97,13 +96,6 @@ impl LoopProblem<'_> {
         }
         parameters.extend([LoopParameter::Bandwidth, LoopParameter::IntegralTime]);
         parameters
-    }
-
-    /// Returns the position-loop gain of a minimum, s⁻¹; that of `axis` if it is not fitted.
-    pub fn gain_of(&self, axis: &AxisConfig, minimum: &LoopMinimum) -> f64 {
-        let parameters = self.parameters(axis);
-        let gain = parameters.iter().zip(&minimum.values).find(|(p, _)| **p == LoopParameter::Gain);
-        gain.map_or(axis.position_loop.gain, |(_, gain)| *gain)
     }
 
     pub fn residuals(

@@ -44,9 +44,6 @@ pub(super) fn possible_loggings(
     CurrentLoggings {
         instants: logged_instants(recordings, &cycles, uncertain),
         error: error.clamp(LEAST_RIPPLE_ERROR, LARGEST_RIPPLE_ERROR),
-        // A logger that delays the actual values by a part of a cycle leaves their phase unknown, and so do interpolated samples.
-        is_phase_known: !fit.is_between_cycles()
-            && !recordings.iter().any(|(signals, _)| is_between_renewals(signals)),
         is_of_identified_loop: true,
     }
 }
@@ -61,7 +58,6 @@ pub(super) fn with_plant_of_loop(
     let loggings = CurrentLoggings {
         instants: logged_instants(recordings, &[(moved, periods)], 0.0),
         error: USUAL_RIPPLE_ERROR,
-        is_phase_known: true,
         is_of_identified_loop: false,
     };
     let signals: Vec<&Signals> = recordings.iter().map(|(signals, _)| *signals).collect();

@@ -4,7 +4,6 @@ use nalgebra::DMatrix;
 use virtual_axes_core::config::{AxisConfig, Periods};
 
 use super::loop_parameter::LoopParameter;
-use super::loop_problem::divides;
 
 /// Fitted value with an upper bound of its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,12 +34,4 @@ pub(super) struct LoopFit {
     pub alternatives: Vec<(AxisConfig, Periods)>,
     /// VFFW and lag (s) at both ends of the valley in which the residual hardly changes.
     pub valley: Option<[(f64, f64); 2]>,
-}
-
-impl LoopFit {
-    /// Returns true if the lag is no whole number of position cycles.
-    pub fn is_between_cycles(&self) -> bool {
-        let lag = self.values.iter().find(|value| value.parameter == LoopParameter::Lag);
-        lag.is_some_and(|lag| !divides(self.periods.position, lag.value))
-    }
 }

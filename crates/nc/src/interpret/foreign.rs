@@ -4,8 +4,8 @@ use std::io::{BufRead, Seek, SeekFrom};
 
 use virtual_axes_core::encoding::TextEncoding;
 
-use super::dialect::code_of;
 use super::encoding::{LINE_BYTES, SEARCHED_BYTES, read_line};
+use super::line_code::code_of;
 
 /// First word of another control.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

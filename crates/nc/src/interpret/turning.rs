@@ -4,8 +4,9 @@ use std::io::{BufRead, Seek, SeekFrom};
 
 use virtual_axes_core::encoding::TextEncoding;
 
-use super::dialect::{Dialect, code_of, has_word};
+use super::dialect::Dialect;
 use super::encoding::{LINE_BYTES, SEARCHED_BYTES, read_line};
+use super::line_code::{code_of, has_word};
 
 /// Points from which a program is one for turning.
 const ENOUGH: u32 = 4;
