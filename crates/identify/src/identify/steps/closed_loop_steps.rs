@@ -47,7 +47,7 @@ impl IdentificationSteps<'_> {
             self.found.findings.push(Finding::missing(
                 "not-a-cascade",
                 "no delays and no refinement: the position controller of the initial machine is not the cascade",
-                "record with the cascade, and set `<joint>.position_loop.controller` to cascade",
+                "record with the cascade, and set `<joint>.position_loop.controller=cascade`",
             ));
             return;
         }
