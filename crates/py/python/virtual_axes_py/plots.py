@@ -112,8 +112,8 @@ def _is_rapid(run: Run) -> NDArray[np.bool_]:
         return float(np.mean((late - early) ** 2))
 
     lag = min(range(len(rows)), key=deviation)
-    is_rapid = is_rapid[np.clip(cycles - lag, 0, len(is_rapid) - 1)]
-    return is_rapid & ~is_rapid.all()
+    delayed = is_rapid[np.clip(cycles - lag, 0, len(is_rapid) - 1)]
+    return np.zeros_like(delayed) if delayed.all() else delayed
 
 
 def plot_path(run: Run, plane: str | None, ax: Axes | None) -> Figure:
