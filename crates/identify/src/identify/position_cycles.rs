@@ -14,7 +14,7 @@ const POSSIBLE: f64 = 1.5;
 /// The same up to which a cycle is compared with the plant of its ripple.
 const COMPARED: f64 = 2.0;
 /// Residual of the current relative to the least one, from which on a cycle is none of the control.
-const CURRENT: f64 = 1.15;
+const CURRENT: f64 = 2.0;
 /// Largest number of fits with the plant of the ripple, which depend on each other, and change of the inertia that ends them.
 const PLANT_PASSES: usize = 4;
 const SAME_INERTIA: f64 = 0.02;
