@@ -10,7 +10,7 @@ use virtual_axes_identify::identify::{
 use virtual_axes_identify::recording::Signals;
 
 use super::figures;
-use super::page::{IdentificationPage, file_name, format_r_squared, with_unit};
+use super::page::{IdentificationPage, format_r_squared, with_unit};
 use super::recordings::{bands, over_time, single_recording};
 use super::step::Step;
 use crate::{Band, Chart, ChartAxis, ChartSeries, DisplayUnit, Panel, Section, SeriesStyle};
@@ -56,8 +56,8 @@ pub(super) fn validation_section(
     check: &AxisValidation,
     summary: &ValidationSummary,
 ) -> Section {
-    let mut section = single_recording(&check.recorded, &summary.recording);
-    section.heading = format!("Validation on {}", file_name(&summary.recording.name));
+    let mut section = single_recording(page, &check.recorded, &summary.recording);
+    section.heading = format!("Validation on {}", page.file_name(&summary.recording.name));
     section.paragraphs.push("This recording was not used for the identification.".to_owned());
     fill(page, &mut section, &[(&check.recorded.signals, &check.agreement, &summary.residuals)]);
     section
@@ -67,7 +67,7 @@ fn fill(page: &IdentificationPage, section: &mut Section, compared: &[Compared])
     for (signals, agreement, _) in
         compared.iter().filter(|(_, agreement, _)| agreement.experiments.is_empty())
     {
-        let name = file_name(&signals.name);
+        let name = page.file_name(&signals.name);
         section.paragraphs.push(match &agreement.inverse {
             Some(_) => format!(
                 "{name} has no PSEC that begins at rest: its current is compared with inverse dynamics. \
@@ -83,7 +83,7 @@ fn fill(page: &IdentificationPage, section: &mut Section, compared: &[Compared])
     let found = &page.found.summary;
     let residuals: Vec<(String, &ResidualSummary)> = compared
         .iter()
-        .map(|(signals, _, residuals)| (file_name(&signals.name).to_owned(), *residuals))
+        .map(|(signals, _, residuals)| (page.file_name(&signals.name).to_owned(), *residuals))
         .collect();
     if !residuals.is_empty() {
         section.tables.push(figures::agreement(found, &residuals));
@@ -100,7 +100,7 @@ fn fill(page: &IdentificationPage, section: &mut Section, compared: &[Compared])
         let count = agreement.experiments.len();
         for (i, (experiment, simulated)) in agreement.experiments.iter().zip(&agreement.simulated).enumerate()
         {
-            let name = name(signals, experiment, i, count);
+            let name = name(page.file_name(&signals.name), experiment, i, count);
             let run = Run { page, signals, agreement, experiment, simulated };
             section.charts.extend(run.charts(&name));
         }
@@ -111,10 +111,10 @@ fn fill(page: &IdentificationPage, section: &mut Section, compared: &[Compared])
 }
 
 /// Returns the name of a part of a recording, numbered if there are several parts.
-fn name(signals: &Signals, experiment: &Experiment, i: usize, count: usize) -> String {
-    let (name, mode) = (file_name(&signals.name), experiment.mode.name());
+fn name(recording: &str, experiment: &Experiment, i: usize, count: usize) -> String {
+    let mode = experiment.mode.name();
     let part = if count > 1 { format!(", part {}", i + 1) } else { String::new() };
-    format!("{name}{part}, feedforward {mode}")
+    format!("{recording}{part}, feedforward {mode}")
 }
 
 /// A part of a recording with its simulation.
@@ -255,7 +255,7 @@ fn inverse_chart(page: &IdentificationPage, signals: &Signals, agreement: &Agree
         note: format!("R² {}", format_r_squared(inverse.r_squared)),
         bands: bands(signals, &agreement.segments),
         ..Chart::new(
-            format!("{}: current by inverse dynamics", file_name(&signals.name)),
+            format!("{}: current by inverse dynamics", page.file_name(&signals.name)),
             ChartAxis::new("Time", DisplayUnit::SECOND),
             panels,
         )

@@ -12,7 +12,7 @@ use virtual_axes_identify::identify::{
 };
 use virtual_axes_identify::recording::Severity;
 
-use super::page::{counted, exponent_unit};
+use super::page::{counted, exponent_unit, file_name};
 use crate::text::{NONE, digits};
 use crate::{DisplayUnit, Table};
 
@@ -44,15 +44,18 @@ pub fn verdict(found: &IdentificationSummary) -> String {
 }
 
 /// Returns the name of a validation recording.
-fn validation_name(name: &str) -> String {
-    format!("{name} (validation)")
+fn validation_name(found: &IdentificationSummary, name: &str) -> String {
+    format!("{} (validation)", file_name(found, name))
 }
 
 /// Lists all recordings by their use.
 pub fn all_recordings(found: &IdentificationSummary) -> Table {
-    let validations = found.validation.iter().map(|v| (validation_name(&v.recording.name), &v.recording));
+    let validations =
+        found.validation.iter().map(|v| (validation_name(found, &v.recording.name), &v.recording));
     let own = found.recordings.iter().chain(&found.transmission_recordings);
-    recordings(own.map(|recording| (recording.name.clone(), recording)).chain(validations))
+    recordings(
+        own.map(|recording| (file_name(found, &recording.name).to_owned(), recording)).chain(validations),
+    )
 }
 
 /// Lists recordings under the given names.
@@ -328,8 +331,9 @@ pub fn regression(name: &str, found: &FeedforwardRegression) -> String {
 
 /// Returns the residuals of the recordings and of the validation recordings, by name.
 pub fn residuals(found: &IdentificationSummary) -> Vec<(String, &ResidualSummary)> {
-    let identified = found.agreement.iter().map(|a| (a.name.clone(), &a.residuals));
-    let validated = found.validation.iter().map(|v| (validation_name(&v.recording.name), &v.residuals));
+    let identified = found.agreement.iter().map(|a| (file_name(found, &a.name).to_owned(), &a.residuals));
+    let validated =
+        found.validation.iter().map(|v| (validation_name(found, &v.recording.name), &v.residuals));
     identified.chain(validated).collect()
 }
 

@@ -4,7 +4,7 @@ use virtual_axes_identify::identify::{InertiaFit, RefinedParameter};
 use virtual_axes_identify::recording::Signals;
 
 use super::figures;
-use super::page::{IdentificationPage, file_name, with_unit};
+use super::page::{IdentificationPage, with_unit};
 use super::step::Step;
 use crate::extent::Extent;
 use crate::text::capital;
@@ -58,7 +58,7 @@ fn chart(page: &IdentificationPage, inertia: &InertiaFit) -> Chart {
         .map(|(number, signals)| {
             let of_it = inertia.instants.iter().filter(|instant| instant.0 == number);
             let points = of_it.map(|(_, time, value)| [*time, *value]).collect();
-            ChartSeries::new(file_name(&signals.name), SeriesStyle::Points(number), points)
+            ChartSeries::new(page.file_name(&signals.name), SeriesStyle::Points(number), points)
         })
         .filter(|series| !series.points.is_empty())
         .collect();

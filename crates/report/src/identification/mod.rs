@@ -21,7 +21,7 @@ use virtual_axes_identify::recording::Severity;
 use crate::text::capital;
 use crate::{Chart, ChartAxis, ChartSeries, DisplayUnit, Document, Panel, Section, SeriesStyle};
 pub use page::IdentificationPage;
-use page::{counted, notice};
+use page::counted;
 use step::Step;
 
 /// Creates one page of one or several axes of a machine; `machine_file` is a sentence about the machine file.
@@ -133,7 +133,7 @@ impl IdentificationPage<'_> {
         };
         Section {
             paragraphs: vec![text],
-            notices: general.into_iter().map(notice).collect(),
+            notices: general.into_iter().map(|finding| self.notice(finding)).collect(),
             tables: vec![figures::values(values)],
             ..Section::new("Identified parameters")
         }

@@ -2,6 +2,7 @@
 
 use virtual_axes_core::config::{AxisConfig, AxisKind, Periods};
 use virtual_axes_identify::identify::AxisIdentification;
+use virtual_axes_identify::identify::summary::IdentificationSummary;
 use virtual_axes_identify::recording::{Finding, Severity};
 
 use super::step::Step;
@@ -22,8 +23,25 @@ impl IdentificationPage<'_> {
     pub(super) fn step(&self, heading: &str, step: Step) -> Section {
         let found = &self.found.identification;
         let about = |finding: &&Finding| Step::of(finding, found.refinement.as_ref()).contains(&step);
-        let notices = found.findings.iter().filter(about).map(notice).collect();
+        let notices = found.findings.iter().filter(about).map(|finding| self.notice(finding)).collect();
         Section { notices, ..Section::new(heading) }
+    }
+
+    /// Converts a finding with its remedy to a notice; the paths of the recordings are among the facts.
+    pub(super) fn notice(&self, finding: &Finding) -> Notice {
+        let level = match finding.severity {
+            Severity::Note => NoticeLevel::Note,
+            Severity::Warning => NoticeLevel::Warning,
+            Severity::Missing | Severity::Invalid => NoticeLevel::Missing,
+        };
+        let summary = &self.found.summary;
+        let shorten = |text: String, path: &str| text.replace(path, file_name(summary, path));
+        Notice::new(level, names(summary).fold(finding.to_string(), shorten))
+    }
+
+    /// Returns the file name of a recording, or its path if another recording has the same file name.
+    pub(super) fn file_name<'a>(&self, recording: &'a str) -> &'a str {
+        file_name(&self.found.summary, recording)
     }
 
     /// Returns the periods with the identified position cycle.
@@ -70,19 +88,18 @@ pub(super) fn exponent_unit(speed_unit: &str) -> &'static str {
     if speed_unit == "rpm" { "min/rev" } else { "min/m" }
 }
 
-/// Returns the file name of a recording, whose path is among the facts.
-pub(super) fn file_name(recording: &str) -> &str {
-    recording.rsplit(['/', '\\']).next().unwrap_or(recording)
+/// Returns the file name of a recording, or its path if another recording has the same file name.
+pub(super) fn file_name<'a>(found: &IdentificationSummary, recording: &'a str) -> &'a str {
+    let last = |path: &'a str| path.rsplit(['/', '\\']).next().unwrap_or(path);
+    let name = last(recording);
+    let is_other = |path: &str| path != recording && path.rsplit(['/', '\\']).next() == Some(name);
+    if names(found).any(is_other) { recording } else { name }
 }
 
-/// Converts a finding with its remedy to a notice.
-pub(super) fn notice(finding: &Finding) -> Notice {
-    let level = match finding.severity {
-        Severity::Note => NoticeLevel::Note,
-        Severity::Warning => NoticeLevel::Warning,
-        Severity::Missing | Severity::Invalid => NoticeLevel::Missing,
-    };
-    Notice::new(level, finding.to_string())
+/// Returns the paths of all recordings.
+fn names(found: &IdentificationSummary) -> impl Iterator<Item = &str> {
+    let own = found.recordings.iter().chain(&found.transmission_recordings);
+    own.chain(found.validation.iter().map(|v| &v.recording)).map(|recording| recording.name.as_str())
 }
 
 /// Formats a value in SI units in `unit`, with `count` significant digits and the symbol.

@@ -6,7 +6,7 @@ use virtual_axes_identify::identify::{Agreement, ConditionedRecording, MotionSeg
 use virtual_axes_identify::recording::{SignalSpan, Signals};
 
 use super::figures;
-use super::page::{IdentificationPage, file_name, notice};
+use super::page::IdentificationPage;
 use crate::{
     Band, BandClass, Chart, ChartAxis, ChartSeries, DisplayUnit, Panel, Section, SeriesStyle, Table,
     TableColumn,
@@ -21,26 +21,34 @@ pub(super) fn section(page: &IdentificationPage) -> Section {
                 (Prévost fig. 4); parts that are too short or not steady belong to none.";
     Section {
         paragraphs: vec![text.to_owned()],
-        notices: recordings.iter().flat_map(|recorded| &recorded.findings).map(notice).collect(),
-        tables: vec![table(&found.summary.recordings)],
+        notices: recordings
+            .iter()
+            .flat_map(|recorded| &recorded.findings)
+            .map(|finding| page.notice(finding))
+            .collect(),
+        tables: vec![table(page, &found.summary.recordings)],
         charts: charts.collect(),
         ..Section::new("Recordings")
     }
 }
 
 /// Creates a section with the notices and the table of one recording.
-pub(super) fn single_recording(recorded: &ConditionedRecording, recording: &RecordingSummary) -> Section {
+pub(super) fn single_recording(
+    page: &IdentificationPage,
+    recorded: &ConditionedRecording,
+    recording: &RecordingSummary,
+) -> Section {
     Section {
-        notices: recorded.findings.iter().map(notice).collect(),
-        tables: vec![table(std::slice::from_ref(recording))],
+        notices: recorded.findings.iter().map(|finding| page.notice(finding)).collect(),
+        tables: vec![table(page, std::slice::from_ref(recording))],
         ..Section::default()
     }
 }
 
 /// Lists recordings with their sections and the parts of their motion.
-fn table(recordings: &[RecordingSummary]) -> Table {
+fn table(page: &IdentificationPage, recordings: &[RecordingSummary]) -> Table {
     let mut table = figures::recordings(
-        recordings.iter().map(|recording| (file_name(&recording.name).to_owned(), recording)),
+        recordings.iter().map(|recording| (page.file_name(&recording.name).to_owned(), recording)),
     );
     table.columns.push(TableColumn::new("spans", ""));
     table
@@ -70,7 +78,7 @@ fn chart(page: &IdentificationPage, signals: &Signals, agreement: Option<&Agreem
     Chart {
         bands: agreement.map_or_else(Vec::new, |agreement| bands(signals, &agreement.segments)),
         ..Chart::new(
-            format!("Recording {}", file_name(&signals.name)),
+            format!("Recording {}", page.file_name(&signals.name)),
             ChartAxis::new("Time", DisplayUnit::SECOND),
             panels,
         )

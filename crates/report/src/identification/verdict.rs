@@ -4,7 +4,7 @@ use virtual_axes_identify::identify::summary::{BaselineSummary, IdentificationSu
 use virtual_axes_identify::recording::Severity;
 
 use super::figures;
-use super::page::{IdentificationPage, file_name, notice};
+use super::page::{IdentificationPage, file_name};
 use crate::text::{capital, digits};
 use crate::{Section, Table};
 
@@ -20,7 +20,7 @@ pub(super) fn section(page: &IdentificationPage, machine_file: Option<&str>) -> 
     };
     let mut section = Section::new("Result");
     section.paragraphs.push(format!("{verdict} {}.", capital(&figures::verdict(summary))));
-    section.notices = invalid.into_iter().map(notice).collect();
+    section.notices = invalid.into_iter().map(|finding| page.notice(finding)).collect();
     section.paragraphs.extend(machine_file.map(str::to_owned));
     if summary.validation.is_empty() {
         section.paragraphs.push(
@@ -35,8 +35,8 @@ pub(super) fn section(page: &IdentificationPage, machine_file: Option<&str>) -> 
 /// Returns the residuals with a baseline, those of validation recordings first.
 fn baselines(found: &IdentificationSummary) -> Vec<(String, bool, &ResidualSummary, &BaselineSummary)> {
     let unseen =
-        found.validation.iter().map(|v| (file_name(&v.recording.name).to_owned(), true, &v.residuals));
-    let own = found.agreement.iter().map(|a| (file_name(&a.name).to_owned(), false, &a.residuals));
+        found.validation.iter().map(|v| (file_name(found, &v.recording.name).to_owned(), true, &v.residuals));
+    let own = found.agreement.iter().map(|a| (file_name(found, &a.name).to_owned(), false, &a.residuals));
     let with_baseline = |(name, is_unseen, residuals): (String, bool, _)| {
         let residuals: &ResidualSummary = residuals;
         Some((name, is_unseen, residuals, residuals.baseline.as_ref()?))

@@ -357,6 +357,26 @@ fn missing_results_are_reported() {
 }
 
 #[test]
+fn a_recording_has_its_file_name_unless_another_has_the_same() {
+    let course = Course { range: Some([0.0, 0.1]), max_feed: Some(5.0 * M_MIN) };
+    let parts = [FeedforwardMode::Off, FeedforwardMode::Velocity];
+    let mut case = TestCase::new(parameters::<&str>(&[]), "x", &parts, &course, |_| {});
+    for (second, shown) in
+        [("/traces/b/slow.csv", ["fast.csv", "slow.csv"]), ("/traces/b/fast.csv", ["/traces/a/fast.csv"; 2])]
+    {
+        case.recordings[0].1.name = "/traces/a/fast.csv".to_owned();
+        case.recordings[1].1.name = second.to_owned();
+        case.findings[0] = vec![Finding::note("gap", "/traces/a/fast.csv: a gap of 6 ms")];
+        let (found, values) = case.identify(false);
+        let document = case.document(&found, &values);
+        let recordings = section(&document, "Recordings");
+        assert_eq!(recordings.tables[0].rows[0][0], shown[0]);
+        assert_eq!(recordings.notices[0].text, format!("{}: a gap of 6 ms", shown[0]));
+        assert_eq!(recordings.tables[0].rows[1][0], if shown[0] == shown[1] { second } else { shown[1] });
+    }
+}
+
+#[test]
 fn a_rotary_axis_is_reported_in_degrees() {
     let parts = [FeedforwardMode::Both];
     let course = Course { range: None, max_feed: None };
