@@ -15,6 +15,8 @@ const PHASES: i64 = 12;
 /// Roughness of the position over the instants at which it is renewed, relative to that over the stamps, from which on
 /// the samples are those of these instants.
 const SMOOTHER: f64 = 0.3;
+/// Roughness relative to the least one up to which phases are alike.
+const ALIKE: f64 = 1.01;
 /// Largest mean distance of the stamps from uniform ones, in sampling periods.
 const JITTER: f64 = 0.1;
 /// Fewest samples that show it, and most that are compared.
@@ -112,7 +114,11 @@ impl Renewals {
                 (least, found) = (sum, Some((cycle, phase)));
             }
         }
-        let (cycle, phase) = found?;
+        let (cycle, first) = found?;
+        let phase = middle_phase(cycle, first, |phase| {
+            let sum = roughness(shown.iter().map(renewed(cycle, phase)), signal, f64::INFINITY);
+            sum.is_some_and(|(sum, _)| sum <= ALIKE * least)
+        });
         let stamps = nominal.iter().map(renewed(cycle, phase)).collect();
         Some(Self { period, nominal, stamps, cycle, phase })
     }
@@ -137,6 +143,18 @@ impl Renewals {
         };
         self.nominal.iter().map(value).collect()
     }
+}
+
+/// Returns the middle of the phases around `first` that the samples show alike.
+fn middle_phase(cycle: f64, first: f64, is_alike: impl Fn(f64) -> bool) -> f64 {
+    let step = cycle / PHASES as f64;
+    let reach = |sign: f64| {
+        let alike = (1..PHASES)
+            .map(|k| sign * k as f64 * step)
+            .take_while(|by| is_alike((first + by).rem_euclid(cycle)));
+        alike.last().unwrap_or(0.0)
+    };
+    (first + 0.5 * (reach(1.0) + reach(-1.0))).rem_euclid(cycle)
 }
 
 /// Returns the polynomial through `points` (instant, value) at an instant.
