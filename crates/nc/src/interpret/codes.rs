@@ -381,6 +381,8 @@ pub(super) struct Codes {
     pub m: MCodes,
     /// Codes without effect on the motion, and the letters of their words.
     pub without_effect: Vec<(String, &'static str)>,
+    /// Letters of words that belong to an auxiliary function if nothing else in the line has them.
+    pub auxiliary_letters: &'static str,
     /// Codes that are not supported, and their remedies.
     pub unsupported: Vec<(String, String)>,
 }
@@ -430,7 +432,14 @@ impl Codes {
                 continue;
             }
             match is_auxiliary(code, dialect) {
-                true => codes.without_effect.push((format!("M{code}"), auxiliary_letters(dialect))),
+                // The axis words of such a line of Marlin are values of the setting.
+                true if dialect == Dialect::Marlin => {
+                    codes.without_effect.push((format!("M{code}"), "ABCDEFHIJKLOPQRSTUVWXYZ"));
+                }
+                true => {
+                    codes.without_effect.push((format!("M{code}"), ""));
+                    codes.auxiliary_letters = auxiliary_letters(dialect);
+                }
                 false => codes.unsupported.push((format!("M{code}"), m_remedy(number))),
             }
         }
@@ -438,9 +447,9 @@ impl Codes {
     }
 }
 
-/// Returns the letters that belong to an auxiliary function. Settings of firmware have values for each axis.
+/// Returns the letters that can belong to an auxiliary function, S of a fan or heater where the control has no other.
 fn auxiliary_letters(dialect: Dialect) -> &'static str {
-    if dialect == Dialect::Marlin { "ABCDEFHIJKLOPQRSTUVWXYZ" } else { "PQRSELIJK" }
+    if matches!(dialect, Dialect::Grbl | Dialect::Mach3) { "PQRSELIJK" } else { "PQRELIJK" }
 }
 
 /// Returns true for an auxiliary function of a machine builder or user, which moves no axis.

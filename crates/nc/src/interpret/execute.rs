@@ -48,11 +48,16 @@ impl State {
         if self.request_macro(block, &codes)? {
             return Ok(());
         }
+        // The words of a motion in effect, of a call and of the spindle are theirs, not those of an auxiliary function.
+        let is_used = block.has_axis() || codes.m.subprogram.is_some();
         for (name, letters) in &codes.without_effect {
             self.note_without_effect(name.clone());
             if codes.g.motion.is_none() && codes.g.action.is_none() {
                 block.skip(letters);
             }
+        }
+        if !is_used && codes.g.motion.is_none() && codes.g.action.is_none() {
+            block.skip(codes.auxiliary_letters);
         }
         for (name, remedy) in &codes.unsupported {
             self.reject(format!("{name} is not supported in the dialect {}: {remedy}", self.dialect))?;
@@ -109,6 +114,7 @@ impl State {
         }
         self.stop(&codes)?;
         self.jump(block, &codes)?;
+        block.skip(codes.auxiliary_letters);
         if self.dialect != Dialect::LinuxCnc {
             // Offset numbers may stand anywhere.
             block.skip("DH");

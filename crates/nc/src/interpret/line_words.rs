@@ -30,6 +30,8 @@ pub(super) struct LineWords {
     pub ignored: Vec<String>,
     /// True if the line has an ignored code.
     pub is_ignored_line: bool,
+    /// True if an ignored code takes the axis words of its line, as a G code does.
+    takes_axes: bool,
     /// Corner `,R` or `,C` with its value.
     pub corner: Option<(char, f64)>,
     /// Polar coordinates `@` (radius) and `^` (angle) of LinuxCNC.
@@ -67,7 +69,7 @@ impl LineWords {
         self.m.clear();
         self.settings.clear();
         self.ignored.clear();
-        self.is_ignored_line = false;
+        (self.is_ignored_line, self.takes_axes) = (false, false);
         let mut scanner = Scanner::new(text, state);
         while let Some(byte) = scanner.peek() {
             match byte {
@@ -150,6 +152,7 @@ impl LineWords {
                 let code = code.ok_or_else(|| format!("G{} is not a G code", Rounded(value)))?;
                 if ignored.has_g(code) {
                     self.ignored.push(g_name(code));
+                    self.takes_axes = true;
                 } else {
                     self.is_macro |= state.dialect.has_macro_b() && matches!(code, 650 | 660);
                     self.g.push(code);
@@ -158,9 +161,11 @@ impl LineWords {
             b'm' if !self.is_macro => {
                 let code = integer(value).ok_or_else(|| format!("M{} is not an M code", Rounded(value)))?;
                 require_count(self.m.len() + self.ignored.len(), "M codes")?;
-                match ignored.has_m(code) {
-                    true => self.ignored.push(format!("M{code}")),
-                    false => self.m.push(code),
+                if ignored.has_m(code) {
+                    self.ignored.push(format!("M{code}"));
+                    self.takes_axes |= state.dialect == Dialect::Marlin;
+                } else {
+                    self.m.push(code);
                 }
             }
             b'n' if state.dialect == Dialect::LinuxCnc => {
@@ -281,9 +286,10 @@ impl LineWords {
             && self.settings.is_empty()
     }
 
-    /// Returns true if all codes are ignored: then the words belong to them.
+    /// Returns true if all codes are ignored and the words belong to them: the axis words of an M code move the axes.
     pub(super) fn is_ignored(&self) -> bool {
-        self.is_ignored_line && self.g.is_empty() && self.m.is_empty()
+        let takes_words = self.takes_axes || !self.has_axis();
+        self.is_ignored_line && takes_words && self.g.is_empty() && self.m.is_empty()
     }
 
     /// Rejects words that no code has used.

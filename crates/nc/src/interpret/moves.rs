@@ -70,11 +70,11 @@ impl State {
         match code {
             // G0 of Marlin moves at the feed.
             Motion::Rapid if self.dialect != Dialect::Marlin || self.modal.feed.is_none() => {
-                let end = self.targets(block)?;
+                let end = self.line_targets(block)?;
                 self.rapid_to(&end)
             }
             Motion::Rapid | Motion::Line => {
-                let end = self.targets(block)?;
+                let end = self.line_targets(block)?;
                 self.line_to(&end)
             }
             Motion::Skip | Motion::Probe382 | Motion::Probe383 | Motion::Probe384 | Motion::Probe385 => {
@@ -91,6 +91,15 @@ impl State {
             }
             _ => self.cycle(block, code),
         }
+    }
+
+    /// Returns the end of a line as [`targets`](Self::targets), with the change of the tool length since the last motion of Z.
+    fn line_targets(&mut self, block: &mut LineWords) -> Outcome<Coordinates> {
+        let is_increment = self.modal.is_incremental && block.get('Z').is_some();
+        let change = if is_increment { self.pending_length() } else { 0.0 };
+        let mut end = self.targets(block)?;
+        end[2] += change;
+        Ok(end)
     }
 
     /// Returns the programmed coordinates of the end of a motion by the axis words, which then count as used, m and rad.

@@ -121,6 +121,8 @@ pub(super) struct Offsets {
     pub saved_shift: Coordinates,
     /// Tool length offset along Z (G43); 0 with tool center point control.
     pub tool_length: f64,
+    /// Change of the tool length offset that the next increment of Z adds, with Z of the axes there (Fanuc, Haas), m.
+    pub length_change: Option<(f64, f64)>,
     /// Tip of the tool and axes at the start of tool center point control: without a motion it ends at the same bits.
     pub tcp_start: Option<[Coordinates; 2]>,
 }
@@ -256,6 +258,7 @@ impl State {
                 local: none,
                 saved_shift: none,
                 tool_length: 0.0,
+                length_change: None,
                 tcp_start: None,
             },
             dialect: options.dialect.unwrap_or_default(),

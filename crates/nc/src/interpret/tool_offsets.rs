@@ -17,6 +17,7 @@ impl State {
         let active = self.modal.tool_length_code.filter(|_| has_number);
         let Some(code) = codes.g.tool_length.or(active) else { return Ok(()) };
         self.modal.tool_length_code = Some(code);
+        let before = self.offsets.tool_length + self.modal.tcp_length.unwrap_or(0.0);
         match code {
             ToolLength::Off | ToolLength::OffByG53 | ToolLength::CenterPointOff => {
                 self.leave_tcp();
@@ -52,7 +53,19 @@ impl State {
                 }
             }
         }
+        if matches!(self.dialect, Dialect::Fanuc | Dialect::Haas) {
+            // An increment counts from the programmed point, which a new length does not move.
+            let after = self.offsets.tool_length + self.modal.tcp_length.unwrap_or(0.0);
+            self.offsets.length_change = Some((self.position[2], self.pending_length() + after - before));
+        }
         Ok(())
+    }
+
+    /// Returns the change of the tool length offset since the last motion of Z, m; 0 for controls that do not add it to an
+    /// increment.
+    pub(super) fn pending_length(&self) -> f64 {
+        let change = self.offsets.length_change.filter(|(position, _)| *position == self.position[2]);
+        change.map_or(0.0, |(_, change)| change)
     }
 
     /// Switches between tool center point control and positions of the axes, as the machines of LinuxCNC with switchable

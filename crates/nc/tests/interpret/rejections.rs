@@ -270,7 +270,12 @@ fn ignored_codes_have_no_effect() {
     let options =
         InterpreterOptions { ignored: IgnoredCodes::new(patterns.into()), ..InterpreterOptions::default() };
     assert_eq!(motions("G0 X1 M100\nM100 P5 Q2\nG0 X2", options.clone()).len(), 2);
-    assert_eq!(motions("G0 X1\nM100 X7\nM100 P1 G0 X2", options.clone()).len(), 2, "words of the code");
+    assert_eq!(motions("G0 X1\nM100 P7\nM100 P1 G0 X2", options.clone()).len(), 2, "words of the code");
+    assert_eq!(
+        motions("G0 X1\nX7 M100 P1\nG0 X2", options.clone()).len(),
+        3,
+        "words of the motion in effect"
+    );
     assert_eq!(motions("G0 X1\nG78 X7 P2\nG0 X2", options.clone()).len(), 2, "words of a G code");
     assert_eq!(events("T1 M6", options.clone()).len(), 2, "selection and end, no change");
     let program = "G0 X1\nM6\nO1 repeat [3]\nM100 P5 M6\nO1 endrepeat\n";

@@ -44,7 +44,7 @@ pub struct PartProgramArguments {
     /// Duration of a change of the spindle speed of a part program, s [default: of the machine file].
     #[arg(long = "spindle-s", value_name = "S", value_parser = not_negative, allow_negative_numbers = true)]
     spindle_s: Option<f64>,
-    /// G and M codes that have no effect in a part program: M7,G187,M100-M199,M1xx,G5*. Of a line without other codes only F, S and T remain. Each one found is noted.
+    /// G and M codes that have no effect in a part program: M7,G187,M100-M199,M1xx,G5*. Of a line without other codes only F, S and T remain, and axis words beside M codes. Each one found is noted.
     #[arg(long, value_name = "CODES", value_delimiter = ',')]
     ignore: Vec<CodePattern>,
     /// Bound of the chord error of a part program's setpoints as a polyline, µm: slows the feed in curves [default: none].
