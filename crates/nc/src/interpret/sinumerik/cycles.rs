@@ -5,6 +5,7 @@ use super::super::error::Outcome;
 use super::super::state::State;
 use super::cycle_values::{CycleValues, Dwell, feed_to, pause, rapid};
 use super::deep_hole::DeepHole;
+use super::tapping::Tapping;
 use super::value::ProgramValue;
 use crate::motion::{PathControl, ProgramEvent};
 
@@ -14,9 +15,9 @@ pub(super) struct DrillingCycle {
     kind: DrillingKind,
     /// Plane of retraction RTP, to which the cycle returns.
     retract: f64,
-    /// VariableReference plane RFP.
+    /// Reference plane RFP.
     reference: f64,
-    /// VariableReference plane with the safety distance, RFP + SDIS.
+    /// Reference plane with the safety distance, RFP + SDIS.
     start: f64,
     /// Depth.
     bottom: f64,
@@ -30,8 +31,8 @@ enum DrillingKind {
     Drilling,
     /// CYCLE83.
     DeepHole(DeepHole),
-    /// CYCLE84: pitch, m, with the speeds in and out, rpm; 0 for the active one.
-    Tapping { pitch: f64, speeds: [f64; 2] },
+    /// CYCLE84.
+    Tapping(Tapping),
     /// CYCLE840: pitch, m, or the programmed feed.
     FloatingTapping { pitch: Option<f64> },
     /// CYCLE85: feeds in and out, in units of the program; `None` for the active one.
@@ -50,13 +51,7 @@ impl DrillingCycle {
         let values = CycleValues { cycle: name, values, length: state.modal.length };
         let kind = match name {
             "CYCLE81" | "CYCLE82" | "CYCLE83" => DrillingKind::Drilling,
-            "CYCLE84" => {
-                let pitch = values.pitch(7, 8, Some(13))?;
-                let pitch = pitch
-                    .ok_or("CYCLE84 requires MPIT or PIT, its value 8 or 9: size or pitch of the thread")?;
-                let speeds = [values.get(10)?, values.get(11)?].map(|speed| speed.unwrap_or(0.0).abs());
-                DrillingKind::Tapping { pitch, speeds }
-            }
+            "CYCLE84" => DrillingKind::Tapping(Tapping::new(&values)?),
             "CYCLE840" => DrillingKind::FloatingTapping { pitch: values.pitch(9, 10, None)? },
             "CYCLE85" => {
                 let feeds = [values.get(6)?, values.get(7)?];
@@ -127,19 +122,7 @@ fn drill(cycle: &DrillingCycle, state: &mut State) -> Outcome<()> {
             pause(*dwell, state)?;
         }
         DrillingKind::DeepHole(hole) => hole.drill([*reference, *start, *bottom], *dwell, state)?,
-        DrillingKind::Tapping { pitch, speeds } => {
-            let speed = |speed: f64| if speed > 0.0 { speed } else { state.modal.spindle_speed };
-            let feeds = speeds.map(|value| speed(value) * pitch);
-            if feeds[0] <= 0.0 {
-                return Err("CYCLE84 requires SST, its value 11, or a spindle speed S".to_owned());
-            }
-            state.modal.feed_mode = FeedMode::PerMinute;
-            state.modal.feed = Some([feeds[0]; 2]);
-            feed_to(*bottom, state)?;
-            pause(*dwell, state)?;
-            state.modal.feed = Some([if feeds[1] > 0.0 { feeds[1] } else { feeds[0] }; 2]);
-            feed_to(*start, state)?;
-        }
+        DrillingKind::Tapping(tapping) => tapping.tap([*reference, *start, *bottom], *dwell, state)?,
         DrillingKind::FloatingTapping { pitch } => {
             if let Some(pitch) = pitch {
                 if state.modal.spindle_speed <= 0.0 {

@@ -35,6 +35,7 @@ mod soft_path;
 mod statement;
 mod structures;
 mod system;
+mod tapping;
 mod tilt;
 mod value;
 mod variables;
