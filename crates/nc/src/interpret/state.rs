@@ -119,10 +119,12 @@ pub(super) struct Offsets {
     pub local: Coordinates,
     /// Offset that G92.3 restores.
     pub saved_shift: Coordinates,
-    /// Tool length offset along Z (G43); 0 with tool center point control.
+    /// Tool length offset (G43); 0 with tool center point control.
     pub tool_length: f64,
     /// Change of the tool length offset that the next increment of Z adds, with Z of the axes there (Fanuc, Haas), m.
     pub length_change: Option<(f64, f64)>,
+    /// Axis of the tool length of Sinumerik in all planes; `None` for the normal of the plane.
+    pub length_axis: Option<usize>,
     /// Tip of the tool and axes at the start of tool center point control: without a motion it ends at the same bits.
     pub tcp_start: Option<[Coordinates; 2]>,
 }
@@ -259,6 +261,7 @@ impl State {
                 saved_shift: none,
                 tool_length: 0.0,
                 length_change: None,
+                length_axis: None,
                 tcp_start: None,
             },
             dialect: options.dialect.unwrap_or_default(),
@@ -302,8 +305,16 @@ impl State {
     /// Returns the position of an axis at programmed coordinate 0 without rotations and scaling, m or rad.
     pub(super) fn origin(&self, axis: usize) -> f64 {
         let work = self.options.work_offsets[self.offsets.active][axis];
-        let tool = if axis == 2 { self.offsets.tool_length } else { 0.0 };
+        let tool = if axis == self.length_axis() { self.offsets.tool_length } else { 0.0 };
         work + self.offsets.shift[axis] + self.offsets.local[axis] + tool
+    }
+
+    /// Returns the axis along which the tool length acts: Z, and of Sinumerik the normal of the plane.
+    pub(super) fn length_axis(&self) -> usize {
+        match self.dialect {
+            Dialect::Sinumerik => self.offsets.length_axis.unwrap_or(self.modal.plane.axes()[2]),
+            _ => 2,
+        }
     }
 
     /// Returns the programmed coordinate of the position, in units of the program.
@@ -384,7 +395,7 @@ impl State {
     fn plane_map_of(&self, tool_length: f64, frame: &CoordinateFrame) -> CoordinateFrame {
         let vector = |coordinates: &Coordinates| Vector3::from_column_slice(&coordinates[..3]);
         let system = self.offsets.active;
-        let tool = Vector3::new(0.0, 0.0, tool_length);
+        let tool = Vector3::ith(self.length_axis(), tool_length);
         let work = CoordinateFrame::shift(vector(&self.options.work_offsets[system]) + tool);
         let rotation = self.offsets.rotations.get(&system).copied().unwrap_or(0.0);
         let shift = vector(&self.offsets.shift) + vector(&self.offsets.local);

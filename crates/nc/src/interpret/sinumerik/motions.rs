@@ -43,6 +43,7 @@ impl Sinumerik {
         state: &mut State,
     ) -> Outcome<()> {
         require_axes(words, state)?;
+        note_length_axis(state);
         if suppression == Suppression::All {
             self.require_no_approach()?;
             return self.machine_motion(words, state);
@@ -107,13 +108,16 @@ impl Sinumerik {
             state.assume("SUPA, G53 and G153 with TRAORI: axis positions, as after TRAFOOF".to_owned());
             state.leave_tcp();
         }
-        let tool_length = tcp_length.unwrap_or(state.offsets.tool_length);
+        let (tool_length, length_axis) = match tcp_length {
+            Some(length) => (length, 2),
+            None => (state.offsets.tool_length, state.length_axis()),
+        };
         state.moves_in_machine_coordinates = true;
         let mut end = state.position;
         for (axis, word) in words.axes.iter_mut().enumerate() {
             let Some((value, approach)) = word.take() else { continue };
             let value = value * state.unit(axis);
-            let tool = if axis == 2 { tool_length } else { 0.0 };
+            let tool = if axis == length_axis { tool_length } else { 0.0 };
             end[axis] = match approach {
                 Approach::Incremental => end[axis] + value,
                 Approach::Modal if state.modal.is_incremental => end[axis] + value,
@@ -264,6 +268,17 @@ fn direction(
     };
     let length = x.hypot(y);
     (length > 1e-12).then(|| [x / length, y / length])
+}
+
+/// Notes a tool length that does not act along Z.
+fn note_length_axis(state: &mut State) {
+    let axis = state.length_axis();
+    if axis != 2 && state.offsets.tool_length != 0.0 && state.offsets.length_axis.is_none() {
+        let (plane, letter) = (if axis == 1 { "G18" } else { "G19" }, AXIS_LETTERS[axis]);
+        state.assume(format!(
+            "{plane}: the tool length acts along {letter}, normal to the plane; program $SC_TOOL_LENGTH_CONST=17 if the              machine has this setting, with which it acts along Z in each plane"
+        ));
+    }
 }
 
 /// Rejects words of axes that the machine lacks.

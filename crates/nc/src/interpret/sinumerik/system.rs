@@ -209,6 +209,20 @@ pub(super) fn set_system(
             }
             Ok(true)
         }
+        // Axis of the tool length in all planes, by the plane of which it is the normal.
+        "$SC_TOOL_LENGTH_CONST" => {
+            let axis = match value.number()?.abs() {
+                0.0 => None,
+                18.0 => Some(1),
+                19.0 => Some(0),
+                _ => Some(2),
+            };
+            if axis != state.offsets.length_axis {
+                state.finish_contour()?;
+                state.offsets.length_axis = axis;
+            }
+            Ok(true)
+        }
         _ => Ok(false),
     }
 }
