@@ -291,12 +291,20 @@ impl ProgramSurvey {
         let letter =
             AXIS_LETTERS.iter().position(|letter| axis.name().eq_ignore_ascii_case(&letter.to_string()));
         let Some(index) = letter else { return "none".to_owned() };
+        let is_rotary = axis.kind() == AxisKind::Rotary;
+        if self.has_tool_center_point && is_rotary {
+            return format!(
+                "none: an offset of {} turns the tool: post the other solution of the rotary axes, or check on a machine \
+                 with this travel",
+                AXIS_LETTERS[index]
+            );
+        }
         if self.has_tool_center_point {
             return format!("{name}: with tool center point control, move the workpiece frame");
         }
         let offset = self.work_offsets.get(&system).map_or(0.0, |offset| offset[index]);
         let [least, most] = [limits.travel_min - low, limits.travel_max - high].map(|shift| offset + shift);
-        if axis.kind() == AxisKind::Rotary && (least > TURN || most < -TURN) {
+        if is_rotary && (least > TURN || most < -TURN) {
             return format!("none: {} turns more than its travel: it must be continuous", axis.name());
         }
         let [least, most] = [least, most].map(|position| Position(axis, position).to_string());
@@ -304,7 +312,10 @@ impl ProgramSurvey {
             return "none: G91 or G92 counts from where the axis starts: program a motion into the travel before".to_owned();
         }
         let letter = AXIS_LETTERS[index];
-        let fit = format!("{name} {letter}: {least} to {most} (now {})", Position(axis, offset));
+        let mut fit = format!("{name} {letter}: {least} to {most} (now {})", Position(axis, offset));
+        if is_rotary {
+            fit += ", which turns workpiece or tool";
+        }
         match self.set_work_offsets.contains(&system) {
             true => fit + ", which the program sets by G10: change it there",
             false => fit,

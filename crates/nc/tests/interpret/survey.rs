@@ -181,5 +181,13 @@ fn windings_beyond_the_travel_have_no_work_offset_that_fits() {
     let found = page(&folder, "G54 G91\nG0 X1\nG1 F1000 A7200\nM2\n", &options).expect("beyond the travel");
     assert!(found.contains("none: a turns more than its travel: it must be continuous"), "{found}");
     let found = page(&folder, "G54\nG0 X1\nG1 F1000 A200\nM2\n", &options).expect("beyond the travel");
-    assert!(found.contains("G54 A: -230° to -80° (now 0°)"), "{found}");
+    assert!(found.contains("G54 A: -230° to -80° (now 0°), which turns workpiece or tool"), "{found}");
+    for (text, dialect) in [
+        ("G54\nT1 M6\nG43.4 H1\nG0 X1.\nG1 F1000. A130.\nM30\n", Dialect::Fanuc),
+        ("G54\nTRAORI\nG0 X1\nG1 F1000 A=130\nM30\n", Dialect::Sinumerik),
+    ] {
+        let options = PartProgramOptions { dialect: Some(dialect), ..options.clone() };
+        let found = page(&folder, text, &options).expect("beyond the travel");
+        assert!(found.contains("none: an offset of A turns the tool: post the other solution"), "{found}");
+    }
 }
