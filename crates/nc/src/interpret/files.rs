@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use virtual_axes_core::text::escaped;
+
 use super::dialect::Dialect;
 use super::error::Outcome;
 use super::options::InterpreterOptions;
@@ -12,19 +14,28 @@ const MAX_ENTRIES: usize = 10_000;
 /// Largest file of a subprogram, bytes.
 const MAX_FILE: u64 = 1 << 24;
 
-/// Reads the file of a subprogram, if the folder has one.
+/// Reads the file of a subprogram, if the folder has one: its name without folder, and its text.
 ///
 /// # Errors
 ///
 /// A file that cannot be read or is too large.
-pub(super) fn subprogram_file(options: &InterpreterOptions, label: &str) -> Outcome<Option<Vec<u8>>> {
+pub(super) fn subprogram_file(
+    options: &InterpreterOptions,
+    label: &str,
+) -> Outcome<Option<(String, Vec<u8>)>> {
     let Some(path) = find(options, label) else { return Ok(None) };
     let failure = |error: std::io::Error| format!("O{label}: {}: {error}", path.display());
     let size = fs::metadata(&path).map_err(failure)?.len();
     if size > MAX_FILE {
         return Err(format!("O{label}: its file has {size} bytes, at most {MAX_FILE} are allowed"));
     }
-    fs::read(&path).map(Some).map_err(failure)
+    let text = fs::read(&path).map_err(failure)?;
+    Ok(Some((file_name(&path), text)))
+}
+
+/// Returns the name of a file without its folder, for messages.
+pub(super) fn file_name(path: &Path) -> String {
+    path.file_name().map(|file| escaped(&file.to_string_lossy())).unwrap_or_default()
 }
 
 /// Returns true for a regular file that the options permit as a subprogram.

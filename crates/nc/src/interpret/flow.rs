@@ -354,7 +354,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
             let line = self.state.line;
             let read = self.source.read(&mut self.line.raw);
             if read.is_err() {
-                self.state.line = self.source.line();
+                self.note_line();
             }
             if !read? {
                 return Err(missing());
@@ -366,7 +366,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
             }
             let Ok(statement) = Scanner::new(&self.line.text, &self.state).statement() else { continue };
             if statement.label == label && ends.contains(&statement.keyword) {
-                self.state.line = self.source.line();
+                self.note_line();
                 return Ok(statement.keyword);
             }
             if matches!(statement.keyword, Keyword::Sub | Keyword::EndSub) {
@@ -438,12 +438,12 @@ impl<R: BufRead + Seek> Interpreter<R> {
         if let Some(place) = known(&self.flow) {
             return Ok(place);
         }
-        let text = subprogram_file(&self.state.options, label)?;
-        let text = text.ok_or_else(|| {
+        let file = subprogram_file(&self.state.options, label)?;
+        let (name, text) = file.ok_or_else(|| {
             let name = if self.state.dialect == Dialect::Okuma { &label.to_uppercase() } else { label };
             format!("O{name}: no such subprogram in this file, and no file with its name beside it")
         })?;
-        let start = self.source.add_file(text)?;
+        let start = self.source.add_file(&name, text)?;
         let mut found = self.find_subprograms(start)?;
         // A file without the number of its program begins with its first line.
         let place = *found.entry(label.to_owned()).or_insert(start);
@@ -468,7 +468,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
                 break;
             }
             if read.is_err() {
-                self.state.line = self.source.line();
+                self.note_line();
             }
             if !read? {
                 if self.source.place() == before {

@@ -60,7 +60,7 @@ pub use limits::{ADDITIONAL_OFFSET_COUNT, WORK_OFFSET_COUNT};
 pub(crate) use line_code::{code_of, has_word};
 pub use line_modes::LineModes;
 pub use options::{InterpreterOptions, TipTransform};
-pub use report::{InterpretationReport, OccurrenceTable, Occurrences};
+pub use report::{FileLine, InterpretationReport, OccurrenceTable, Occurrences};
 pub use tools::{Tool, ToolTable};
 pub use work_offset::WorkOffset;
 pub use work_offset::system_name;
@@ -97,7 +97,8 @@ pub struct Interpreter<R> {
 }
 
 impl<R: BufRead + Seek> Interpreter<R> {
-    /// Creates the interpreter of the program in `source`, from its start; `name` is the file in messages.
+    /// Creates the interpreter of the program in `source`, from its start; `name` is the file in messages. Those on the file of
+    /// a subprogram have its own name.
     pub fn new(mut source: R, name: &str, mut options: InterpreterOptions) -> Self {
         let foreign = SourceHead::of(&mut source).foreign.map(|format| (1, foreign_reason(format)));
         let dialect = match options.dialect {
@@ -129,6 +130,11 @@ impl<R: BufRead + Seek> Interpreter<R> {
     /// Returns the source line that was read last, from 1.
     pub fn line(&self) -> usize {
         self.source.line()
+    }
+
+    /// Returns the line in the file of a subprogram that was read last; `None` in the program.
+    pub fn line_of_file(&self) -> Option<&FileLine> {
+        self.state.file.as_ref()
     }
 
     /// Returns the dialect of the program, and what it was detected from.
@@ -167,6 +173,12 @@ impl<R: BufRead + Seek> Interpreter<R> {
         line.is_optional && self.state.options.skips_optional_lines
     }
 
+    /// Notes the line that was read last.
+    fn note_line(&mut self) {
+        self.state.line = self.source.line();
+        self.state.file = self.source.line_of_file();
+    }
+
     /// Executes the next line.
     fn execute_line(&mut self) -> Outcome<()> {
         if self.state.dialect == Dialect::Sinumerik {
@@ -174,7 +186,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
         }
         let place = self.source.place();
         let is_line = self.source.read(&mut self.line.raw);
-        self.state.line = self.source.line();
+        self.note_line();
         if !is_line? {
             self.state.has_ended = true;
             self.require_closed()?;
@@ -312,12 +324,8 @@ impl<R: BufRead + Seek> Iterator for Interpreter<R> {
                 self.state.has_ended = true;
                 return Some(Err(ProgramError { name: self.name.clone(), line, reason }));
             }
-            let line = self.execute_line();
-            let at_file = |reason: String| match self.source.line_of_file() {
-                Some(line) => escaped(&format!("line {line} of the file of a subprogram: {reason}")),
-                None => escaped(&reason),
-            };
-            if let Err(reason) = line.map_err(at_file) {
+            if let Err(reason) = self.execute_line() {
+                let reason = escaped(&reason);
                 if self.state.options.reports_all_errors && !self.source.has_failed() {
                     // An interpreter that continues returns no error of a line.
                     let _ = self.state.reject(reason);
@@ -325,7 +333,11 @@ impl<R: BufRead + Seek> Iterator for Interpreter<R> {
                 }
                 self.state.steps.clear();
                 self.state.has_ended = true;
-                return Some(Err(ProgramError { name: self.name.clone(), line: self.state.line, reason }));
+                let (name, line) = match &self.state.file {
+                    Some(FileLine { name, line }) => (name.to_string(), *line),
+                    None => (self.name.clone(), self.state.line),
+                };
+                return Some(Err(ProgramError { name, line, reason }));
             }
         }
     }

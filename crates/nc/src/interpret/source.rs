@@ -1,6 +1,7 @@
 //! Lines of a program, with bounded memory and a bounded number of repetitions.
 
 use std::io::{BufRead, Cursor, Seek, SeekFrom};
+use std::sync::Arc;
 
 use virtual_axes_core::encoding::TextEncoding;
 
@@ -9,6 +10,7 @@ use super::encoding::read_line;
 use super::error::Outcome;
 use super::foreign::foreign_format;
 use super::limits::{MAX_IDLE_LINES, MAX_LINE};
+use super::report::FileLine;
 
 /// Largest number of files of subprograms.
 const MAX_FILES: usize = 100;
@@ -70,6 +72,15 @@ impl SourceHead {
     }
 }
 
+/// File of subprograms.
+#[derive(Debug)]
+struct SubprogramFile {
+    name: Arc<str>,
+    /// Text, and its place that is read next.
+    text: Cursor<Vec<u8>>,
+    encoding: TextEncoding,
+}
+
 /// Source of lines.
 #[derive(Debug)]
 pub(super) struct LineSource<R> {
@@ -77,8 +88,8 @@ pub(super) struct LineSource<R> {
     next: Place,
     /// First line of the program, which a text without words may precede.
     start: Place,
-    /// Files of subprograms: text, and its place that is read next.
-    files: Vec<(Cursor<Vec<u8>>, TextEncoding)>,
+    /// Files of subprograms.
+    files: Vec<SubprogramFile>,
     encoding: TextEncoding,
     /// Line of the program that was read last, from 1.
     program_line: usize,
@@ -122,18 +133,19 @@ impl<R: BufRead + Seek> LineSource<R> {
         self.program_line
     }
 
-    /// Returns the line that was read last of a file of a subprogram, from 1; `None` in the program.
-    pub(super) fn line_of_file(&self) -> Option<usize> {
-        (self.next.file > 0).then_some(self.next.lines.max(1))
+    /// Returns the line that was read last of the file of a subprogram; `None` in the program.
+    pub(super) fn line_of_file(&self) -> Option<FileLine> {
+        let file = self.files.get(self.next.file.checked_sub(1)?)?;
+        Some(FileLine { name: Arc::clone(&file.name), line: self.next.lines.max(1) })
     }
 
     /// Adds the text of a file, and returns its start.
-    pub(super) fn add_file(&mut self, text: Vec<u8>) -> Outcome<Place> {
+    pub(super) fn add_file(&mut self, name: &str, text: Vec<u8>) -> Outcome<Place> {
         if self.files.len() >= MAX_FILES {
             return Err(format!("the program calls more than {MAX_FILES} files"));
         }
         let encoding = TextEncoding::of(&text);
-        self.files.push((Cursor::new(text), encoding));
+        self.files.push(SubprogramFile { name: name.into(), text: Cursor::new(text), encoding });
         Ok(Place { file: self.files.len(), ..Place::START })
     }
 
@@ -147,7 +159,7 @@ impl<R: BufRead + Seek> LineSource<R> {
         let place = if place == Place::START { self.start } else { place };
         let start = SeekFrom::Start(place.offset);
         match place.file.checked_sub(1).and_then(|index| self.files.get_mut(index)) {
-            Some((file, _)) => file.seek(start),
+            Some(file) => file.text.seek(start),
             None => self.reader.seek(start),
         }
         .map_err(|error| error.to_string())?;
@@ -211,7 +223,7 @@ impl<R: BufRead + Seek> LineSource<R> {
         loop {
             let limit = MAX_LINE + 2;
             let read = match self.next.file.checked_sub(1).and_then(|index| self.files.get_mut(index)) {
-                Some((file, encoding)) => read_line(*encoding, file, limit, line),
+                Some(file) => read_line(file.encoding, &mut file.text, limit, line),
                 None => read_line(self.encoding, &mut self.reader, limit, line),
             }
             .map_err(|error| error.to_string())?;

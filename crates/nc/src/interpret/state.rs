@@ -15,7 +15,7 @@ use super::frame::CoordinateFrame;
 use super::okuma;
 use super::options::InterpreterOptions;
 use super::parameters::{FIRST_OF_CONTROL, FIRST_VARIABLE_OF_CONTROL, LOCALS, ParameterValues};
-use super::report::{InterpretationReport, count};
+use super::report::{FileLine, InterpretationReport, count};
 use crate::motion::{AXIS_COUNT, AXIS_LETTERS, Coordinates, PathControl, Plane, ProgramStep, is_rotary};
 
 /// Plane of the path that a rotary axis carries.
@@ -53,8 +53,10 @@ pub(super) struct State {
     /// Tilted plane (G68.2) in the work coordinate system, which the table angles of each position place.
     pub tilt: Option<CoordinateFrame>,
     pub modal: Modal,
-    /// Source line, from 1.
+    /// Line of the program, from 1: in the file of a subprogram, that of the call.
     pub line: usize,
+    /// Line in the file of a subprogram; `None` in the program.
+    pub file: Option<FileLine>,
     /// Depth of subprogram calls.
     pub calls: usize,
     /// Value returned by the last subprogram.
@@ -272,6 +274,7 @@ impl State {
             tilt: None,
             modal,
             line: 1,
+            file: None,
             calls: 0,
             returned: None,
             spline: None,
@@ -343,12 +346,12 @@ impl State {
 
     /// Adds an assumption to the report.
     pub(super) fn assume(&mut self, text: String) {
-        count(&mut self.report.assumptions, text, self.line);
+        count(&mut self.report.assumptions, text, self.line, &self.file);
     }
 
     /// Adds a code without effect to the report.
     pub(super) fn note_without_effect(&mut self, name: String) {
-        count(&mut self.report.without_effect, name, self.line);
+        count(&mut self.report.without_effect, name, self.line, &self.file);
     }
 
     /// Reports an error and continues, if the options require a report of all errors.
@@ -356,7 +359,7 @@ impl State {
         if !self.options.reports_all_errors {
             return Err(reason);
         }
-        count(&mut self.report.errors, escaped(&reason), self.line);
+        count(&mut self.report.errors, escaped(&reason), self.line, &self.file);
         Ok(())
     }
 

@@ -155,11 +155,11 @@ impl ProgramTrack {
     pub fn notes(&self) -> Vec<(usize, String)> {
         let dialect = self.dialect.iter().filter_map(DetectedDialect::note);
         let codes = self.report.without_effect.iter().map(|(code, found)| {
-            let Occurrences { count, first_line } = found;
-            (*first_line, format!("{code} is ignored, {count} in all"))
+            let Occurrences { count, first_line, .. } = found;
+            (*first_line, found.located(&format!("{code} is ignored, {count} in all")))
         });
         let assumptions =
-            self.report.assumptions.iter().map(|(text, found)| (found.first_line, text.clone()));
+            self.report.assumptions.iter().map(|(text, found)| (found.first_line, found.located(text)));
         let stop = self.stop.map(|line| (line, "M0 and M1 stop the axes and do not wait".to_owned()));
         let merging = "G64 Q has no effect: short lines are joined within P".to_owned();
         let merging = self.merge_tolerance.map(|line| (line, merging));

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
+use std::sync::Arc;
 
 use virtual_axes_core::config::{AxisConfig, AxisKind, MachineConfig};
 use virtual_axes_core::text::{BuiltinFiles, escaped};
@@ -135,12 +136,24 @@ impl ProgramSurvey {
             has_tool_center_point: false,
         };
         let mut failure = None;
+        // Line of the last call of a file.
+        let mut call = None;
         while let Some(step) = steps.next() {
             on_line(steps.line())?;
+            if let Some(file) = steps.line_of_file() {
+                call = Some((steps.line(), Arc::clone(&file.name)));
+            }
             match step {
                 Ok(ProgramStep::Motion(motion)) => {
+                    let is_within = survey.first_excess.is_none();
                     let system = (!steps.moves_in_machine_coordinates()).then(|| steps.work_offset());
                     survey.add(&motion, &transform, machine, system.map(|(index, _)| index));
+                    if let (true, Some((line, text)), Some((call, file))) =
+                        (is_within, &mut survey.first_excess, &call)
+                        && line == call
+                    {
+                        *text += &format!("; this line calls {file}");
+                    }
                     if let Some((index, offset)) = system {
                         survey.work_offsets.insert(index, offset);
                         if given.get(index) != Some(&offset) {
@@ -159,8 +172,9 @@ impl ProgramSurvey {
         survey.report.clone_from(steps.report());
         survey.missing_axes = steps.missing_axes();
         if let Some(error) = failure {
-            let found = Occurrences { count: 1, first_line: error.line };
-            survey.report.errors.insert(error.reason, found);
+            let file = steps.line_of_file().cloned();
+            let first_line = if file.is_some() { steps.line() } else { error.line };
+            survey.report.errors.insert(error.reason, Occurrences { count: 1, first_line, file });
         }
         Ok(survey)
     }
@@ -236,9 +250,9 @@ impl ProgramSurvey {
             let dialect = self.dialect.dialect;
             let _ = writeln!(page, "{name}: {} errors, read in the dialect {dialect}", errors.len());
         }
-        for (text, Occurrences { count, first_line }) in errors.iter().take(MAX_LINES) {
-            let times = if *count > 1 { format!(" ({count} times)") } else { String::new() };
-            let _ = writeln!(page, "{name}:{first_line}: {text}{times}");
+        for (text, found) in errors.iter().take(MAX_LINES) {
+            let times = if found.count > 1 { format!(" ({} times)", found.count) } else { String::new() };
+            let _ = writeln!(page, "{}: {text}{times}", found.place(&name));
         }
         if errors.len() > MAX_LINES {
             let _ = writeln!(page, "{name}: {} further errors", errors.len() - MAX_LINES);

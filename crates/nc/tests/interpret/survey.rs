@@ -138,15 +138,55 @@ fn subprograms_stand_in_files_beside_the_program() {
     assert_eq!(run("M98 (row.tap) L3\nG0 Y1\nM30\n", Dialect::Mach3), Ok(5));
     assert_eq!(run("O1\nM98 (/Memory/ROW.TAP)\nG0 Y1.\nM30\n", Dialect::Haas), Ok(3));
     let error = run("G0 X1\no<faulty> call\nM2\n", Dialect::LinuxCnc).expect_err("a fault");
-    assert!(
-        error.starts_with("part.nc:2: line 2 of the file of a subprogram: word Q has no effect"),
-        "{error}"
-    );
+    assert!(error.starts_with("faulty.ngc:2: word Q has no effect"), "{error}");
+    // A value, and an error behind the return.
+    folder.file("O0021.nc", "O0021\nG0 X1.\nG1 X2. F-1.\nM99\n");
+    let error = run("O1\nM98 P21\nM30\n", Dialect::Haas).expect_err("a fault");
+    assert!(error.starts_with("O0021.nc:3: word F: -1 is invalid"), "{error}");
+    let error = run("O1\nM98 P20\nG0 X1. Q7\nM30\n", Dialect::Fanuc).expect_err("a fault");
+    assert!(error.starts_with("part.nc:3: word Q has no effect"), "{error}");
     let error = run("o<none> call\nM2\n", Dialect::LinuxCnc).expect_err("no file");
     assert_eq!(
         error,
         "part.nc:1: Onone: no such subprogram in this file, and no file with its name beside it"
     );
+}
+
+#[test]
+fn messages_name_the_file_of_a_subprogram() {
+    let folder = Folder::new("survey_lines");
+    folder.file("O77.nc", "O77\nG0 X1.\nM777\nG888\nG1 Y-300. F100. M98 P78\nM99\n");
+    folder.file("O78.nc", "O78\nG1 X2. Q7\nM99\n");
+    let options = PartProgramOptions { dialect: Some(Dialect::Haas), ..PartProgramOptions::default() };
+    let found = page(&folder, "O1\nG0 Y1. Q8\nM98 P77\nM98 P77\nM30\n", &options).expect("errors");
+    let lines: Vec<&str> = found.lines().collect();
+    assert!(lines[1].starts_with("part.nc:2: word Q has no effect in this line with G0"), "{found}");
+    assert!(
+        found.contains("O77.nc:4: G888 is not supported") && found.matches("(2 times)").count() == 2,
+        "{found}"
+    );
+    assert!(found.contains("O78.nc:2: word Q has no effect in this line with G1"), "{found}");
+    assert!(
+        found.contains("part.nc:3: y at -0.3 m (-300 mm) is outside of its travel limits")
+            && found.contains("; this line calls O77.nc"),
+        "{found}"
+    );
+    let name = folder.file("part.nc", "O1\nM98 P77\nM30\n");
+    let survey = ProgramSurvey::new::<String>(&name, &[], &machine(), &options, |_| Ok(())).expect("a file");
+    let notes = survey.notes();
+    assert!(
+        notes.iter().any(|note| *note == (2, "M777 is ignored, 1 in all (O77.nc:3)".to_owned())),
+        "{notes:?}"
+    );
+
+    folder.file("LORENZ.SPF", "PROC LORENZ\nG0 X1\nSPLINE_X(3)\nRET\n");
+    let options = PartProgramOptions { dialect: Some(Dialect::Sinumerik), ..PartProgramOptions::default() };
+    for call in ["LORENZ", "CALL \"LORENZ\""] {
+        let found = page(&folder, &format!("G0 X5\n{call}\nX=1+\nM30\n"), &options).expect("errors");
+        let lines: Vec<&str> = found.lines().collect();
+        assert!(lines[1].starts_with("LORENZ.SPF:3: "), "{found}");
+        assert!(lines[2].starts_with("part.nc:3: "), "{found}");
+    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Calls as data: subprograms and sections that run, and values that are passed to them.
 
 use std::io::Cursor;
+use std::sync::Arc;
 
 use super::super::source::{LineSource, Place};
 use super::cycles::DrillingCycle;
@@ -48,7 +49,8 @@ pub(super) struct SavedModes {
 /// File of a subprogram.
 #[derive(Debug)]
 pub(super) struct OpenFile {
-    pub name: String,
+    /// Name without folder.
+    pub name: Arc<str>,
     pub lines: LineSource<Cursor<Vec<u8>>>,
 }
 

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use std::path::PathBuf;
 
 use super::super::error::Outcome;
-use super::super::files::is_permitted;
+use super::super::files::{file_name, is_permitted};
 use super::super::limits::{MAX_CALLS, REPEATED_LINES};
 use super::super::options::InterpreterOptions;
 use super::super::source::LineSource;
@@ -282,6 +282,5 @@ fn open_file(options: &InterpreterOptions, name: &str) -> Outcome<OpenFile> {
         return Err(format!("{name}: the file has {size} bytes, at most {MAX_FILE} are allowed"));
     }
     let text = fs::read(&path).map_err(failure)?;
-    let shown = path.file_name().map(|file| file.to_string_lossy().into_owned()).unwrap_or_default();
-    Ok(OpenFile { name: shown, lines: LineSource::new(Cursor::new(text), REPEATED_LINES) })
+    Ok(OpenFile { name: file_name(&path).into(), lines: LineSource::new(Cursor::new(text), REPEATED_LINES) })
 }

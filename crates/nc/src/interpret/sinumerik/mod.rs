@@ -43,6 +43,7 @@ mod words;
 
 use std::collections::HashSet;
 use std::io::{BufRead, Seek};
+use std::sync::Arc;
 
 use self::call::{ActiveCall, Argument, ModalCall, OpenFile};
 use self::index::{ProgramLines, SourceIndex, head};
@@ -52,6 +53,7 @@ use self::scanner::{BlockScanner, BlockText};
 use self::structures::OpenStructure;
 use self::variables::Variables;
 use super::error::Outcome;
+use super::report::FileLine;
 use super::source::{LineSource, Place};
 use super::state::State;
 use crate::motion::Plane;
@@ -78,7 +80,8 @@ pub(super) struct Sinumerik {
     place: Place,
     /// File of the subprogram that runs; `None` in the program itself.
     file: Option<OpenFile>,
-    is_in_file: bool,
+    /// Name of the file of the present block; `None` in the program itself.
+    file_name: Option<Arc<str>>,
     /// File that the last block has called.
     next_file: Option<OpenFile>,
     /// File to which the last block has returned; the inner `None` is the program itself.
@@ -112,7 +115,7 @@ impl Default for Sinumerik {
             arguments: Vec::new(),
             place: Place::START,
             file: None,
-            is_in_file: false,
+            file_name: None,
             next_file: None,
             returned_file: None,
             missing: HashSet::new(),
@@ -134,16 +137,14 @@ impl Sinumerik {
         state: &mut State,
     ) -> Outcome<()> {
         let mut file = self.file.take();
-        self.is_in_file = file.is_some();
+        self.file_name = file.as_ref().map(|file| Arc::clone(&file.name));
         let result = match &mut file {
             Some(file) => {
-                let name = file.name.clone();
                 let result = self.execute_next(&mut file.lines, state);
                 if !state.steps.is_empty() {
                     file.lines.reset_idle_lines();
                 }
-                let line = file.lines.line();
-                result.map_err(|reason| format!("in {name}, line {line}: {reason}"))
+                result
             }
             None => self.execute_next(source, state),
         };
@@ -161,7 +162,8 @@ impl Sinumerik {
         self.place = lines.place();
         let mut block = std::mem::take(&mut self.block);
         let is_line = lines.read(&mut block.raw);
-        if !self.is_in_file {
+        state.file = self.file_name.clone().map(|name| FileLine { name, line: lines.line() });
+        if state.file.is_none() {
             state.line = lines.line();
         }
         let result = match is_line {

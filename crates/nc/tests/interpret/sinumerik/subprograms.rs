@@ -98,7 +98,7 @@ fn files_beside_the_program_are_subprograms() {
     let lines: Vec<usize> = found.iter().map(|motion| motion.line).collect();
     assert_eq!(lines, [2, 3, 3, 3, 3, 4, 5, 5]);
     let error = steps("G0 X2\nBROKEN\n", options.clone()).expect_err("an error").to_string();
-    assert!(error.starts_with("part.nc:2: in BROKEN.SPF, line 2: NOTHING has no value"), "{error}");
+    assert!(error.starts_with("BROKEN.SPF:2: NOTHING has no value"), "{error}");
     let error = steps("AGAIN\nM30\n%_N_AGAIN_SPF\nAGAIN\nRET\n", options).expect_err("an error").to_string();
     assert!(error.contains("nested more than 50 levels deep"), "{error}");
 }
