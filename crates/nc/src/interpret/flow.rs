@@ -17,8 +17,36 @@ use super::state::Jump;
 use super::text::LineText;
 
 impl<R: BufRead + Seek> Interpreter<R> {
-    /// Executes the O-word of the line at `place`.
+    /// Executes the O-word of the line at `place`. Behind a loop or condition whose first line has an error, its other lines
+    /// are no further errors.
     pub(super) fn execute_o_word(&mut self, place: Place) -> Outcome<()> {
+        let continues = self.state.options.reports_all_errors;
+        let known = continues.then(|| Scanner::new(&self.line.text, &self.state).statement().ok()).flatten();
+        if let Some(Statement { label, keyword }) = &known
+            && keyword.requires_block()
+            && self.flow.failed_labels.contains(label)
+            && self.blocks().iter().all(|block| block.label != *label)
+        {
+            return Ok(());
+        }
+        let result = self.execute_known(place);
+        if let Some(Statement { label, keyword }) = known.filter(|known| known.keyword.begins_block()) {
+            match &result {
+                Ok(()) => drop(self.flow.failed_labels.remove(&label)),
+                Err(_) => {
+                    if self.blocks().last().is_some_and(|block| block.label == label)
+                        && keyword == Keyword::While
+                    {
+                        self.close();
+                    }
+                    self.flow.failed_labels.insert(label);
+                }
+            }
+        }
+        result
+    }
+
+    fn execute_known(&mut self, place: Place) -> Outcome<()> {
         let (Statement { label, keyword }, arguments, count) = self.statement()?;
         let is_true = arguments[0] != 0.0;
         match keyword {

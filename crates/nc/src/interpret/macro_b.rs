@@ -29,20 +29,20 @@ impl<R: BufRead + Seek> Interpreter<R> {
         let text = &self.line.text;
         if text.starts_with(b"if") || (text.starts_with(b"[") && self.state.dialect == Dialect::Haas) {
             self.execute_if()?;
-        } else if text.starts_with(b"while") {
-            let mut scanner = Scanner::new(text, &self.state);
-            scanner.skip("while");
-            let is_true = is_true(scanner.bracket()?);
-            let number = loop_number(&mut scanner, "do")?;
-            self.begin_loop(place, number, is_true)?;
-        } else if text.starts_with(b"do") {
-            let number = loop_number(&mut Scanner::new(text, &self.state), "do")?;
-            self.begin_loop(place, number, true)?;
+        } else if text.starts_with(b"while") || text.starts_with(b"do") {
+            let begun = self.execute_loop(place);
+            if begun.is_err() {
+                self.note_failed_loop();
+            }
+            begun?;
         } else if text.starts_with(b"end") {
             let number = loop_number(&mut Scanner::new(text, &self.state), "end")?;
             let key = (self.flow.calls.len(), number);
-            let start = self.flow.loops.get(&key).copied();
-            self.source.jump(start.ok_or_else(|| format!("END{number} without DO{number}"))?)?;
+            match self.flow.loops.get(&key) {
+                Some(start) => self.source.jump(*start)?,
+                None if self.flow.failed_loops.contains(&key) => {}
+                None => return Err(format!("END{number} without DO{number}")),
+            }
         } else if text.starts_with(b"goto") {
             let mut scanner = Scanner::new(text, &self.state);
             let number = jump_target(&mut scanner)?;
@@ -141,6 +141,26 @@ impl<R: BufRead + Seek> Interpreter<R> {
         }
     }
 
+    /// Executes `WHILE [condition] DOn` or `DOn`.
+    fn execute_loop(&mut self, place: Place) -> Outcome<()> {
+        let mut scanner = Scanner::new(&self.line.text, &self.state);
+        let is_true = if scanner.skip("while") { is_true(scanner.bracket()?) } else { true };
+        let number = loop_number(&mut scanner, "do")?;
+        self.begin_loop(place, number, is_true)
+    }
+
+    /// Notes the number of a loop whose first line has an error: its END is no further error.
+    fn note_failed_loop(&mut self) {
+        let text = String::from_utf8_lossy(&self.line.text);
+        let digits = text.rsplit_once("do").map_or("", |(_, rest)| rest);
+        let end = digits.find(|digit: char| !digit.is_ascii_digit()).unwrap_or(digits.len());
+        if let Ok(number) = digits[..end].parse() {
+            let key = (self.flow.calls.len(), number);
+            self.flow.loops.remove(&key);
+            self.flow.failed_loops.insert(key);
+        }
+    }
+
     fn go_to(&mut self, number: u32) -> Outcome<()> {
         self.state.jump = Some(Jump::Goto { number });
         self.execute_jump()
@@ -152,6 +172,7 @@ impl<R: BufRead + Seek> Interpreter<R> {
             if self.flow.loops.len() >= MAX_SUBPROGRAMS {
                 self.flow.loops.clear();
             }
+            self.flow.failed_loops.remove(&(self.flow.calls.len(), number));
             self.flow.loops.insert((self.flow.calls.len(), number), place);
             return Ok(());
         }

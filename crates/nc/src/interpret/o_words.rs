@@ -1,6 +1,6 @@
 //! O-words: their statements, and the calls, loops and conditions that they open.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::error::Outcome;
 use super::expression::Scanner;
@@ -41,6 +41,25 @@ keywords!(
 );
 
 impl Keyword {
+    /// Returns true if the keyword begins a loop or condition.
+    pub(super) fn begins_block(self) -> bool {
+        matches!(self, Self::If | Self::While | Self::Repeat | Self::Do)
+    }
+
+    /// Returns true if the keyword belongs to a loop or condition that has begun.
+    pub(super) fn requires_block(self) -> bool {
+        matches!(
+            self,
+            Self::ElseIf
+                | Self::Else
+                | Self::EndIf
+                | Self::EndWhile
+                | Self::EndRepeat
+                | Self::Break
+                | Self::Continue
+        )
+    }
+
     /// Returns the keyword as in a program.
     pub(super) fn name(self) -> &'static str {
         KEYWORDS.iter().find(|(_, keyword)| *keyword == self).map_or("", |(name, _)| name)
@@ -65,6 +84,10 @@ pub(super) struct Flow {
     pub numbered: HashMap<(Place, u32), Place>,
     /// Loops of macro B by their numbers: the line of their beginning, with the depth of calls.
     pub loops: HashMap<(usize, u32), Place>,
+    /// Loops of macro B whose first line has an error, by the keys of `loops`.
+    pub failed_loops: HashSet<(usize, u32)>,
+    /// Labels of loops and conditions whose first line has an error.
+    pub failed_labels: HashSet<String>,
     /// First line of each subprogram, once a call has required them.
     pub subprograms: Option<HashMap<String, Place>>,
 }

@@ -141,6 +141,34 @@ fn words_of_other_controls_are_named_in_one_error() {
     }
 }
 
+/// A control that rejects the first line of a loop has no error in its last one.
+#[test]
+fn an_error_of_a_loop_has_no_consequences_at_its_end() {
+    for (dialect, text, expected) in [
+        (Dialect::Fanuc, "#1=0\nDO1 G0 X5.\n#1=#1+1\nEND1\nM30\n", "a line ends after DO1"),
+        (Dialect::Haas, "#1=0\nWHILE [#1 LT] DO2\n#1=#1+1\nG0 X1.\nEND2\nM30\n", ""),
+        (Dialect::LinuxCnc, "O1 while [#<a> LT 3]\nG0 X1\nO1 break\nO1 endwhile\nM2\n", "O1 while: #<a>"),
+        (
+            Dialect::LinuxCnc,
+            "O1 if [#<a>]\nG0 X1\nO1 elseif [1]\nG0 X3\nO1 else\nG0 X2\nO1 endif\nM2\n",
+            "O1 if: #<a>",
+        ),
+        (Dialect::LinuxCnc, "O1 repeat [#<a>]\nG0 X1\nO1 endrepeat\nM2\n", "O1 repeat: #<a>"),
+        (Dialect::LinuxCnc, "O1 do\nG0 X1\nO1 while [#<a>]\nM2\n", "O1 while: #<a>"),
+        (Dialect::LinuxCnc, "#1=0\nO1 while [1/#1 LT 3]\n#1=0\nO1 endwhile\nM2\n", "O1 while"),
+        (Dialect::Sinumerik, "WHILE R1<NOTHING\nG0 X1\nENDWHILE\nM30\n", "NOTHING has no value"),
+        (Dialect::Sinumerik, "FOR R1=1 TO NOTHING\nG0 X1\nENDFOR\nM30\n", "NOTHING has no value"),
+        (Dialect::Sinumerik, "REPEAT\nG0 X1\nUNTIL R1<NOTHING\nM30\n", "NOTHING has no value"),
+    ] {
+        let errors = report(text, dialect).errors;
+        let [(error, found)] = &errors.iter().collect::<Vec<_>>()[..] else { panic!("{text}: {errors:?}") };
+        assert!(error.contains(expected) && found.count == 1, "{text}: {error} {found:?}");
+    }
+    // The same loop without an error has its end.
+    let errors = report("END1\nDO1 X\nEND1\nM30\n", Dialect::Fanuc).errors;
+    assert!(errors.contains_key("END1 without DO1") && errors.len() == 2, "{errors:?}");
+}
+
 #[test]
 fn motions_after_a_missing_feed_start_at_its_end() {
     let text = "G21 G90 G17 G0 X0 Y0\nG1 X10\nG2 X20 Y10 R10\nG2 X30 Y0 I0 J-10\nM2\n";

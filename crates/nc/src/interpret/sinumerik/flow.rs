@@ -56,11 +56,21 @@ impl Sinumerik {
             }
             "FOR" => {
                 scanner.advance(keyword.len());
-                self.start_for(scanner, state, lines)?;
+                let depth = self.blocks.len();
+                let started = self.start_for(scanner, state, lines);
+                if started.is_err() && self.blocks.len() == depth {
+                    // Its ENDFOR is no further error.
+                    self.open(StructureKind::Failed("ENDFOR"), lines)?;
+                }
+                started?;
             }
             "WHILE" => {
                 scanner.advance(keyword.len());
-                let is_true = scanner.number_value(&self.scope(state))? != 0.0;
+                let value = scanner.number_value(&self.scope(state));
+                if value.is_err() {
+                    self.open(StructureKind::Failed("ENDWHILE"), lines)?;
+                }
+                let is_true = value? != 0.0;
                 self.open(StructureKind::While, lines)?;
                 if !is_true {
                     self.skip_structure(lines, false)?;
@@ -68,8 +78,12 @@ impl Sinumerik {
             }
             "UNTIL" => {
                 scanner.advance(keyword.len());
-                let is_true = scanner.number_value(&self.scope(state))? != 0.0;
+                let value = scanner.number_value(&self.scope(state));
                 self.innermost(|kind| matches!(kind, StructureKind::Repeat), "UNTIL")?;
+                if value.is_err() {
+                    self.blocks.pop();
+                }
+                let is_true = value? != 0.0;
                 match self.blocks.last() {
                     Some(open) if !is_true => lines.jump(open.body)?,
                     _ => drop(self.blocks.pop()),
@@ -146,7 +160,7 @@ impl Sinumerik {
                 }
                 Ok(())
             }
-            StructureKind::If | StructureKind::Repeat => {
+            StructureKind::If | StructureKind::Repeat | StructureKind::Failed(_) => {
                 self.blocks.pop();
                 Ok(())
             }

@@ -31,6 +31,8 @@ pub(super) enum StructureKind {
     For(String, Vec<ProgramValue>, f64),
     While,
     Repeat,
+    /// Structure whose first line has an error, with the keyword that ends it.
+    Failed(&'static str),
 }
 
 impl StructureKind {
@@ -42,6 +44,7 @@ impl StructureKind {
             StructureKind::For(..) => "ENDFOR",
             StructureKind::While => "ENDWHILE",
             StructureKind::Repeat => "UNTIL",
+            StructureKind::Failed(end) => end,
         }
     }
 }
