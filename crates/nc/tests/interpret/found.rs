@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions, is_g_code};
+use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions, Tool, is_g_code};
 use virtual_axes_nc::motion::ProgramStep;
 
 use crate::common::{millimeters, report, steps};
@@ -167,6 +167,43 @@ fn an_error_of_a_loop_has_no_consequences_at_its_end() {
     // The same loop without an error has its end.
     let errors = report("END1\nDO1 X\nEND1\nM30\n", Dialect::Fanuc).errors;
     assert!(errors.contains_key("END1 without DO1") && errors.len() == 2, "{errors:?}");
+}
+
+#[test]
+fn an_error_of_cutter_compensation_has_no_consequences() {
+    let lead = "T2 M6 G43 H2\nG21 G90 G17 G94 F100\nG0 X0 Y-10\nG41 D2 G1 X0 Y0\n";
+    // The tool of 2 mm does not fit into the groove of 1 mm, the arc of 1 mm.
+    for (contour, expected) in [
+        (
+            "Y20\nX-1\nY19.5\nX-30\nG40 G0 Y60\nM30\n",
+            "the tool radius of 2 mm does not fit into the corner between",
+        ),
+        (
+            "Y20\nG3 X-2 Y20 I-1 J0\nG3 X-30 Y20 I-14 J0\nG1 Y0\nG40 G0 Y-60\nM30\n",
+            "the tool radius of 2 mm does not fit into the arc",
+        ),
+        (
+            "Y20\nG3 X-2 Y20 I-1 J0\nG1 Y0\nG40 G0 Y-60\nM30\n",
+            "the tool radius of 2 mm does not fit into the arc",
+        ),
+    ] {
+        for dialect in [Dialect::Fanuc, Dialect::LinuxCnc] {
+            let mut options = InterpreterOptions {
+                dialect: Some(dialect),
+                reports_all_errors: true,
+                ..InterpreterOptions::default()
+            };
+            options.tools.insert(2, Tool { radius: 0.002, ..Tool::default() });
+            let mut interpreter =
+                Interpreter::new(std::io::Cursor::new(format!("{lead}{contour}")), "part.nc", options);
+            assert!(interpreter.by_ref().all(|step| step.is_ok()), "{contour}");
+            let errors: Vec<_> = interpreter.report().errors.keys().collect();
+            assert!(
+                !errors.is_empty() && errors.iter().all(|error| error.starts_with(expected)),
+                "{contour}: {errors:?}"
+            );
+        }
+    }
 }
 
 #[test]

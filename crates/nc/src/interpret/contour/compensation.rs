@@ -51,8 +51,17 @@ struct Last {
     motion: ProgramMotion,
     /// True for the first motion of the compensation.
     is_first: bool,
+    /// True for a motion with an error, whose path is the contour: its end is no corner.
+    has_failed: bool,
     /// Events and motions normal to the plane that follow.
     after: Vec<ProgramStep>,
+}
+
+impl Last {
+    /// Returns a motion with an error.
+    fn failed(contour: ContourPiece, motion: ProgramMotion) -> Self {
+        Self { contour, path: contour, motion, is_first: false, has_failed: true, after: Vec::new() }
+    }
 }
 
 impl Compensator {
@@ -90,7 +99,8 @@ impl Compensator {
     ///
     /// # Errors
     ///
-    /// A contour that the tool cannot follow, or a curve that is no line or arc in the plane.
+    /// A contour that the tool cannot follow, or a curve that is no line or arc in the plane. The motions after it continue
+    /// without consequences of the error.
     pub(in crate::interpret) fn push(
         &mut self,
         motion: ProgramMotion,
@@ -103,15 +113,26 @@ impl Compensator {
             last.after.push(ProgramStep::Motion(motion));
             return Ok(());
         }
-        let mut path = self.parallel(&contour)?;
+        let parallel = self.parallel(&contour);
         let Some(mut last) = self.last.take() else { return Ok(()) };
+        let mut path = match parallel {
+            Ok(path) => path,
+            Err(reason) => {
+                self.finish(last, out);
+                self.last = Some(Last::failed(contour, motion));
+                return Err(reason);
+            }
+        };
+        let mut result = Ok(());
         let corner = contour.start;
         let (leave, enter) = (last.contour.tangent(true), contour.tangent(false));
         let turn = turn_to(leave, enter, self.is_left);
-        if last.is_first && !self.ends_perpendicular {
+        if last.has_failed {
+            self.finish(last, out);
+        } else if last.is_first && !self.ends_perpendicular {
             // The lead-in ends perpendicular to the contour.
             if self.goes_around {
-                require_in_front((last.contour.end - last.contour.start).dot(&enter))?;
+                result = require_in_front((last.contour.end - last.contour.start).dot(&enter));
             }
             last.path.end = path.start;
             self.finish(last, out);
@@ -124,13 +145,13 @@ impl Compensator {
             out.push(ProgramStep::Motion(self.around(&motion, out, [from, to, corner])));
         } else {
             if turn > 0.0 {
-                self.inside(&mut last, &mut path, corner, motion.line)?;
+                result = self.inside(&mut last, &mut path, corner, motion.line);
             }
             self.finish(last, out);
         }
-        let (is_first, after) = (false, Vec::new());
-        self.last = Some(Last { contour, path, motion, is_first, after });
-        Ok(())
+        let (is_first, has_failed, after) = (false, false, Vec::new());
+        self.last = Some(Last { contour, path, motion, is_first, has_failed, after });
+        result
     }
 
     /// Ends the compensation: appends the steps that wait. Returns the tool center, where the next motion begins, and the
@@ -152,18 +173,28 @@ impl Compensator {
             out.push(ProgramStep::Motion(motion));
             return Ok(());
         }
-        let mut path = contour;
+        let (is_first, has_failed, after) = (contour.arc.is_none(), false, Vec::new());
+        match self.entry(&contour) {
+            Ok(path) => self.last = Some(Last { contour, path, motion, is_first, has_failed, after }),
+            Err(reason) => {
+                self.last = Some(Last::failed(contour, motion));
+                return Err(reason);
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the path of the first motion.
+    fn entry(&self, contour: &ContourPiece) -> Outcome<ContourPiece> {
         if contour.arc.is_some() {
             self.require_longer((contour.end - contour.start).norm(), "arc")?;
-            path = self.entry_arc(&contour)?;
-        } else {
-            if self.ends_perpendicular {
-                self.require_longer((contour.end - contour.start).norm(), "motion")?;
-            }
-            path.end += normal(contour.tangent(true), self.is_left) * self.radius;
+            return self.entry_arc(contour);
         }
-        self.last = Some(Last { contour, path, motion, is_first: contour.arc.is_none(), after: Vec::new() });
-        Ok(())
+        if self.ends_perpendicular {
+            self.require_longer((contour.end - contour.start).norm(), "motion")?;
+        }
+        let end = contour.end + normal(contour.tangent(true), self.is_left) * self.radius;
+        Ok(ContourPiece { end, ..*contour })
     }
 
     fn require_longer(&self, length: f64, what: &str) -> Outcome<()> {
@@ -268,9 +299,11 @@ impl Compensator {
             lead = self.parallel(&last.contour)?;
         }
         let point = lead.intersection(path, corner).ok_or_else(gouges)?;
-        if !(lead.move_to(point, true) & path.move_to(point, false)) {
+        let mut moved = *path;
+        if !(lead.move_to(point, true) & moved.move_to(point, false)) {
             return Err(gouges());
         }
+        *path = moved;
         last.path = match last.is_first {
             true => ContourPiece { end: point, ..last.path },
             false => lead,
