@@ -46,6 +46,8 @@ pub(super) struct LineWords {
     pub first_tool: Option<f64>,
     /// Letter of a word without effect, whose variable, the number, has no value.
     pub vacant: Option<(char, usize)>,
+    /// Error of a word that the line is executed without, if the interpreter continues after errors.
+    pub rejected: Option<String>,
     /// Parameter settings, in their order.
     pub settings: Vec<(Setting, f64)>,
 }
@@ -63,7 +65,7 @@ impl LineWords {
     /// Reads a compact line.
     pub(super) fn read(&mut self, text: &[u8], state: &State) -> Outcome<()> {
         (self.given, self.unused, self.points, self.corner, self.is_macro) = (0, 0, 0, None, false);
-        (self.polar, self.vacant, self.first_tool) = ([None; 2], None, None);
+        (self.polar, self.vacant, self.first_tool, self.rejected) = ([None; 2], None, None, None);
         self.triples.clear();
         self.g.clear();
         self.m.clear();
@@ -185,9 +187,9 @@ impl LineWords {
             }
             // Analog outputs of LinuxCNC have the word E.
             b'e' if !state.dialect.has_macro_b() && !self.m.iter().any(|code| matches!(code, 66..=68)) => {
-                return Err(
+                self.rejected = Some(
                     "word E: the letter E is not supported, the extruder of a printer or the work offset of \
-                            Fadal format 1; numbers have no exponent"
+                     Fadal format 1; numbers have no exponent"
                         .to_owned(),
                 );
             }

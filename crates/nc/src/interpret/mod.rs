@@ -274,6 +274,9 @@ impl<R: BufRead + Seek> Interpreter<R> {
     /// Executes the words of the present line from a byte on.
     fn execute_words(&mut self, from: usize) -> Outcome<()> {
         self.block.read(self.line.text.get(from..).unwrap_or_default(), &self.state)?;
+        if let Some(reason) = self.block.rejected.take() {
+            self.state.reject(reason)?;
+        }
         for code in self.block.ignored.drain(..) {
             self.state.note_without_effect(code);
             self.block.is_ignored_line = true;

@@ -228,4 +228,8 @@ fn all_positions_of_an_extruder_are_one_error() {
     let [(text, found)] = &errors[..] else { panic!("{errors:?}") };
     assert!(text.starts_with("word E: the letter E is not supported, the extruder of a printer"), "{text}");
     assert_eq!((found.count, found.first_line), (3, 3));
+    // The other words of the line count: an arc from its end, at its feed.
+    let errors =
+        report("G21\nG90\nG0 E1 X10\nG1 Y0 E2 F600\nG2 X20 Y10 R10\nG1 X0\nM2\n", Dialect::Marlin).errors;
+    assert!(errors.len() == 1 && errors.keys().all(|text| text.starts_with("word E")), "{errors:?}");
 }
