@@ -273,7 +273,8 @@ impl<R: BufRead + Seek> Interpreter<R> {
 
     /// Executes the words of the present line from a byte on.
     fn execute_words(&mut self, from: usize) -> Outcome<()> {
-        self.block.read(self.line.text.get(from..).unwrap_or_default(), &self.state)?;
+        let words = self.block.read(self.line.text.get(from..).unwrap_or_default(), &self.state);
+        words.map_err(|reason| self.sinumerik_cycle().unwrap_or(reason))?;
         if let Some(reason) = self.block.rejected.take() {
             self.state.reject(reason)?;
         }
@@ -286,6 +287,19 @@ impl<R: BufRead + Seek> Interpreter<R> {
         let result = self.state.execute(&mut self.block);
         result.map_err(|reason| if is_alarm { reason + &self.alarm_cause() } else { reason })?;
         self.execute_jump()
+    }
+
+    /// Returns the error of a line with a cycle of Sinumerik.
+    fn sinumerik_cycle(&self) -> Option<String> {
+        let raw = String::from_utf8_lossy(&self.line.raw).trim().to_ascii_uppercase();
+        let number =
+            raw.strip_prefix('N').map(|rest| rest.trim_start_matches(|digit: char| digit.is_ascii_digit()));
+        let text = number.unwrap_or(&raw).trim_start();
+        let text = text.strip_prefix("MCALL").unwrap_or(text).trim_start();
+        let end = text.find(|letter: char| !letter.is_ascii_alphanumeric()).unwrap_or(text.len());
+        let name = &text[..end];
+        sinumerik::is_name_of_cycle(name)
+            .then(|| format!("{name} is a cycle of Sinumerik: --dialect sinumerik"))
     }
 
     /// Returns the comment of the alarm in the line, and the argument that a macro lacks.

@@ -141,6 +141,30 @@ fn words_of_other_controls_are_named_in_one_error() {
     }
 }
 
+#[test]
+fn cycles_of_sinumerik_are_named_in_other_dialects() {
+    use Dialect::{Fanuc, Grbl, Haas, LinuxCnc, Mach3, Marlin};
+    for dialect in [Fanuc, Grbl, Haas, LinuxCnc, Mach3, Marlin] {
+        for (line, name) in [
+            ("POCKET3(50,0,1,-10,40,20,5,0,0,0,3,0,0,200,100,0,21,4)", "POCKET3"),
+            ("N20 CYCLE81(10,0,2,-8)", "CYCLE81"),
+            ("MCALL CYCLE83 (10, 0, 2, -8)", "CYCLE83"),
+            ("slot1(10,0,2,-8)", "SLOT1"),
+            ("HOLES2(0,0,20,0,60,6)", "HOLES2"),
+        ] {
+            let errors = report(&format!("G21 G90 G0 X1.\n{line}\nM2\n"), dialect).errors;
+            let expected = format!("{name} is a cycle of Sinumerik: --dialect sinumerik");
+            let [(error, found)] = &errors.iter().collect::<Vec<_>>()[..] else {
+                panic!("{line}: {errors:?}")
+            };
+            assert!(**error == expected && found.first_line == 2, "{dialect} {line}: {error}");
+        }
+    }
+    // Labels and words that only begin alike.
+    let errors = report("G21\nC1 P0CKET\nM2\n", Dialect::Haas).errors;
+    assert!(errors.keys().all(|error| !error.contains("Sinumerik")), "{errors:?}");
+}
+
 /// A control that rejects the first line of a loop has no error in its last one.
 #[test]
 fn an_error_of_a_loop_has_no_consequences_at_its_end() {

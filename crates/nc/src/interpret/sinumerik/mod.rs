@@ -41,6 +41,8 @@ mod value;
 mod variables;
 mod words;
 
+pub(super) use invocations::is_name_of_cycle;
+
 use std::collections::HashSet;
 use std::io::{BufRead, Seek};
 use std::sync::Arc;
