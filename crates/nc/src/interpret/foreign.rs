@@ -35,6 +35,9 @@ impl ForeignWord {
     }
 }
 
+/// Text with places that a program fills.
+pub(super) const TEMPLATE: &str = "a template with {…}";
+
 /// Returns the format of a line in upper case, by words that only one control has.
 fn foreign_word(line: &str) -> Option<&'static str> {
     let number =
@@ -57,6 +60,9 @@ fn foreign_word(line: &str) -> Option<&'static str> {
     if starts(&["GOSUB "]) || code == "ENDSUB" || is_condition {
         return Some("a program of EdingCNC with SUB, IF or WHILE");
     }
+    if ["{$", "{{", "{%"].into_iter().any(|brace| code.contains(brace)) {
+        return Some(TEMPLATE);
+    }
     let has_braces = code.match_indices('{').any(|(at, _)| {
         let mut before = code[..at].chars().rev();
         before.next().is_some_and(|letter| letter.is_ascii_uppercase())
@@ -65,6 +71,14 @@ fn foreign_word(line: &str) -> Option<&'static str> {
     let is_statement =
         ["WHILEITERATIONS", "SETVAR.", "SETGLOBAL."].into_iter().any(|word| code.starts_with(word));
     (has_braces || is_statement).then_some("a program of RepRapFirmware with expressions or conditions")
+}
+
+/// Returns the name of the format of a program that begins with `%PM`, if its first line in upper case has the number of a
+/// program of Philips, from N9000 on.
+pub(super) fn philips_format(line: &str) -> Option<&'static str> {
+    let number = line.strip_prefix("N9").unwrap_or_default();
+    let has_number = number.bytes().take_while(u8::is_ascii_digit).count() >= 3;
+    has_number.then_some("a program of Philips (Heidenhain) controls 532 and 3000")
 }
 
 /// Returns the name of the format that a line in upper case shows, if it is no G code of a supported dialect.

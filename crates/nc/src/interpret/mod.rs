@@ -67,7 +67,7 @@ pub use work_offset::system_name;
 
 use self::control_variables::ALARM;
 use self::error::Outcome;
-use self::foreign::ForeignWord;
+use self::foreign::{ForeignWord, TEMPLATE};
 use self::line_words::{LineWords, Setting};
 use self::o_words::{Flow, is_o_word};
 use self::parameters::LOCALS;
@@ -316,6 +316,9 @@ impl<R: BufRead + Seek> Interpreter<R> {
 }
 
 fn foreign_reason(format: &str) -> String {
+    if format == TEMPLATE {
+        return format!("{format} is not supported: expand it first");
+    }
     let dialects = Dialect::ALL.map(Dialect::name).join(", ");
     format!("{format} is not supported: post the program again as G code, in one of the dialects {dialects}")
 }

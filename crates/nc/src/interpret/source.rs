@@ -8,7 +8,7 @@ use virtual_axes_core::encoding::TextEncoding;
 use super::dialect::is_word_line;
 use super::encoding::read_line;
 use super::error::Outcome;
-use super::foreign::foreign_format;
+use super::foreign::{foreign_format, philips_format};
 use super::limits::{MAX_IDLE_LINES, MAX_LINE};
 use super::report::FileLine;
 
@@ -59,6 +59,13 @@ impl SourceHead {
             head.foreign = foreign_format(&text);
             if text.starts_with('%') && !text.starts_with("%_N_") && head.foreign.is_none() {
                 head.start = Place { offset, lines, ..Place::START };
+                let mut is_blank = text == "%PM";
+                while is_blank && read_line(encoding, reader, MAX_LINE, &mut line).is_ok_and(|read| read > 0)
+                {
+                    let text = String::from_utf8_lossy(&line).trim().to_ascii_uppercase();
+                    is_blank = text.is_empty();
+                    head.foreign = philips_format(&text);
+                }
                 break;
             }
             if head.foreign.is_some() || is_word_line(&text) {

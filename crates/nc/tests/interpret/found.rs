@@ -92,6 +92,11 @@ fn other_formats_are_named_in_one_error() {
         ("0 BEGIN PGM 100 MM\n1 L X+0 R0 FMAX\n", "a conversational program of Heidenhain (Klartext)"),
         ("BEGIN PGM PART MM\nTOOL CALL 5 Z S2000\n", "a conversational program of Heidenhain (Klartext)"),
         ("%4711 G71 *\nN10 G30 G17 X+0 Y+0 Z-40 *\n", "a program of Heidenhain in DIN/ISO"),
+        (
+            "%PM\n\nN9000 (PHILIPS SYSTEM 3000)\nN10 G54\n",
+            "a program of Philips (Heidenhain) controls 532 and 3000",
+        ),
+        ("%PM\nN9001\nN1 G17 T1 M6\n", "a program of Philips (Heidenhain) controls 532 and 3000"),
         ("$$ cls\nPARTNO/BRACKET\nGOTO/1,2,3\n", "a cutter location file (APT, CLS)"),
         ("TOOL PATH/PLANAR_MILL,TOOL,T10\nGOTO/1,2,3\n", "a cutter location file (APT, CLS)"),
     ] {
@@ -129,6 +134,14 @@ fn words_of_other_controls_are_named_in_one_error() {
         let error = steps(text, options).expect_err(text).to_string();
         let expected = format!("part.nc:{line}: {format} is not supported: post the program again as G code");
         assert!(error.starts_with(&expected), "{text:?}: {error}");
+    }
+    for text in [
+        "G21\nN1 T{$TOOL1} M6\n",
+        "G21\nG0 X{{x}} Y0\n",
+        "G21\n{% for hole in holes %}\nG0 X1\n{% endfor %}\n",
+    ] {
+        let error = steps(text, InterpreterOptions::default()).expect_err(text).to_string();
+        assert_eq!(error, "part.nc:2: a template with {…} is not supported: expand it first", "{text:?}");
     }
     // Words of supported controls.
     for (text, dialect) in [
