@@ -136,6 +136,8 @@ impl DetectedDialect {
             let points = if dialect == Dialect::Okuma { 4 * ENOUGH } else { ENOUGH };
             scores[dialect as usize].add(points, &format!("the extension {extension}"), 1);
         }
+        // A comment in a file of LinuxCNC may be on the control for which it was before.
+        let has_comments = !extension.is_some_and(|extension| extension.eq_ignore_ascii_case("ngc"));
         let (mut bytes, mut line) = (0, Vec::new());
         let encoding = TextEncoding::of(source.fill_buf().unwrap_or_default());
         for number in 1.. {
@@ -149,7 +151,7 @@ impl DetectedDialect {
                 scores = Default::default();
                 break;
             }
-            add_evidence(&text, number, &mut scores);
+            add_evidence(&text, number, has_comments, &mut scores);
         }
         if source.seek(SeekFrom::Start(0)).is_err() {
             scores = Default::default();
@@ -416,7 +418,8 @@ const RULES: &[(u8, u32, Pattern)] = &[
 /// Lines at the start of a program whose comments are evidence.
 const COMMENT_LINES: usize = 60;
 
-fn add_evidence(line: &str, number: usize, scores: &mut [Score; Dialect::ALL.len()]) {
+/// Adds the evidence of a line in upper case; `has_comments` if comments count.
+fn add_evidence(line: &str, number: usize, has_comments: bool, scores: &mut [Score; Dialect::ALL.len()]) {
     let mut code = code_of(line);
     // Texts for the operator.
     if let Some(message) = ["M117", "M118", "M0"].into_iter().find(|message| code.starts_with(message)) {
@@ -425,6 +428,9 @@ fn add_evidence(line: &str, number: usize, scores: &mut [Score; Dialect::ALL.len
         code.truncate(1);
     }
     for (index, (dialects, points, pattern)) in RULES.iter().enumerate() {
+        if !has_comments && matches!(pattern, Comment(_)) && *dialects != LINUXCNC {
+            continue;
+        }
         let Some(text) = pattern.text_in(line, &code, number) else { continue };
         for (dialect, score) in Dialect::ALL.into_iter().zip(scores.iter_mut()) {
             if dialects & (1 << dialect as u8) != 0 && score.rules.insert(index) {

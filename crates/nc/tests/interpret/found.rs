@@ -2,7 +2,9 @@
 
 use std::io::Cursor;
 
-use virtual_axes_nc::interpret::{Dialect, Interpreter, InterpreterOptions, Tool, is_g_code};
+use virtual_axes_nc::interpret::{
+    DetectedDialect, Dialect, Interpreter, InterpreterOptions, Tool, is_g_code,
+};
 use virtual_axes_nc::motion::ProgramStep;
 
 use crate::common::{millimeters, report, steps};
@@ -241,6 +243,19 @@ fn an_error_of_cutter_compensation_has_no_consequences() {
             );
         }
     }
+}
+
+#[test]
+fn the_extension_of_linuxcnc_stands_against_comments() {
+    let dialect = |name: &str, text: &str| {
+        DetectedDialect::of(&mut std::io::Cursor::new(text.to_owned()), name).dialect
+    };
+    let text = "(CONVERTED FROM HAAS)\nG21 G90\nG4 P2\nM2\n";
+    assert_eq!(dialect("part.ngc", text), Dialect::LinuxCnc);
+    assert_eq!(dialect("PART.NGC", text), Dialect::LinuxCnc);
+    assert_eq!(dialect("part.nc", text), Dialect::Haas);
+    // Words count.
+    assert_eq!(dialect("part.ngc", "(HAAS)\nO1000\nG187 P2\nG103 P1\nM97 P5\n"), Dialect::Haas);
 }
 
 #[test]
