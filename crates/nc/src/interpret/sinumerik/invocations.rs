@@ -200,15 +200,6 @@ fn is_tool_change(name: &str) -> bool {
     )
 }
 
-/// Returns true for a cycle of the control, executed or not.
-pub(in crate::interpret) fn is_name_of_cycle(name: &str) -> bool {
-    let is_numbered = ["CYCLE", "POCKET", "SLOT", "HOLES"].iter().any(|start| {
-        let number = name.strip_prefix(start).unwrap_or_default();
-        !number.is_empty() && number.bytes().all(|digit| digit.is_ascii_digit())
-    });
-    is_numbered || name == "LONGHOLE"
-}
-
 /// Returns true for a cycle that is executed.
 fn is_cycle(name: &str) -> bool {
     matches!(

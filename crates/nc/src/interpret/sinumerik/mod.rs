@@ -41,7 +41,7 @@ mod value;
 mod variables;
 mod words;
 
-pub(super) use invocations::is_name_of_cycle;
+pub(super) use keywords::is_name_of_cycle;
 
 use std::collections::HashSet;
 use std::io::{BufRead, Seek};
