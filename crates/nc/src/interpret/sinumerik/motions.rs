@@ -276,7 +276,8 @@ fn note_length_axis(state: &mut State) {
     if axis != 2 && state.offsets.tool_length != 0.0 && state.offsets.length_axis.is_none() {
         let (plane, letter) = (if axis == 1 { "G18" } else { "G19" }, AXIS_LETTERS[axis]);
         state.assume(format!(
-            "{plane}: the tool length acts along {letter}, normal to the plane; program $SC_TOOL_LENGTH_CONST=17 if the              machine has this setting, with which it acts along Z in each plane"
+            "{plane}: the tool length acts along {letter}, normal to the plane; program $SC_TOOL_LENGTH_CONST=17 if the \
+             machine has this setting, with which it acts along Z in each plane"
         ));
     }
 }
