@@ -68,7 +68,11 @@ impl State {
         }
         if self.dialect == Dialect::Grbl {
             self.note_grbl(block, &codes);
-            // F has the units of its line.
+        }
+        // F has the units of its line; LinuxCNC and Mach3 set it before the units.
+        let sets_units =
+            codes.g.units.is_some() && !matches!(self.dialect, Dialect::LinuxCnc | Dialect::Mach3);
+        if sets_units {
             self.set_plane_and_units(block, &codes);
         }
         self.set_feed(block, &codes)?;
@@ -79,7 +83,9 @@ impl State {
         }
         self.set_coolant(&codes);
         self.dwell(block, &codes)?;
-        self.set_plane_and_units(block, &codes);
+        if !sets_units {
+            self.set_plane_and_units(block, &codes);
+        }
         self.set_distance_modes(&codes);
         if !codes.unsupported.is_empty() {
             block.skip(ALL_LETTERS);
