@@ -135,6 +135,12 @@ impl State {
             return Err("G68 with I, J and K is not supported: program G68.2 with Euler angles".to_owned());
         }
         let [first, second, normal] = self.modal.plane.axes();
+        if self.dialect == Dialect::Haas && self.modal.is_incremental && block.get('R').is_some() {
+            self.assume(
+                "G68 R with G91: the angle replaces the one before, as with Setting 73 off; with it on, the control adds R"
+                    .to_owned(),
+            );
+        }
         let angle = block.take('R').unwrap_or(0.0).to_radians();
         // The center counts before the rotation.
         self.modal.frames[ROTATION] = CoordinateFrame::identity();
