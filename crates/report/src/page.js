@@ -288,11 +288,13 @@
     for (const one of data.runs) {
       const visible = isShown(one.run), plotted = { type: "scatter3d", mode: "lines", meta: one.run, visible, hoverinfo: "text", showlegend: false };
       const point = i => shownPoint(one, i), onPath = i => [0, 1, 2].map(axis => one.reference[axis][i]);
-      if (space.magnification > 1) traces.push({ ...plotted, ...segments(one, isCut(one), onPath), line: { color: color("zero"), width: 2 } });
+      // Of a long program, the way to the first point of a cut has left out points of both.
+      const isOnRapid = i => isRapid(one)(i) || isRapid(one)(i - 1), isOnCut = i => !isOnRapid(i);
+      if (space.magnification > 1) traces.push({ ...plotted, ...segments(one, isOnCut, onPath), line: { color: color("zero"), width: 2 } });
       const isInBox = i => point(i).every((value, axis) => isInside(value, ...ranges[axis]));
-      const isShownRapid = i => isRapid(one)(i) && (space.isWhole || (isInBox(i - 1) && isInBox(i)));
+      const isShownRapid = i => isOnRapid(i) && (space.isWhole || (isInBox(i - 1) && isInBox(i)));
       if (one.rapid.includes(1)) traces.push({ ...plotted, ...segments(one, isShownRapid, point), line: { color: color("muted"), width: 2, dash: "dash" } });
-      const cuts = segments(one, isCut(one), point);
+      const cuts = segments(one, isOnCut, point);
       traces.push({ ...plotted, ...cuts, line: { ...scale, color: cuts.color, width: 5, showscale: one === data.runs[0] } });
       const start = point(0);
       traces.push({ ...plotted, mode: "markers", x: [start[0]], y: [start[1]], z: [start[2]], text: ["start"],
@@ -351,9 +353,21 @@
       figure.plot.on("plotly_relayout", change => linkZoom(figure, change));
       figure.plot.on("plotly_click", ({ points: [point] }) => space && !screen.overPath && show(point.data.meta ?? 0, point.x));
     }
-    if (figure === space) figure.plot.on("plotly_click", ({ points: [point] }) => {
+    if (figure === space) listenToClicks(figure.plot);
+  }
+
+  // A press on the path reports the point under it with each drawing, also at the start of a rotation: only one that ends where
+  // it began is a click, and it is shown behind these reports.
+  function listenToClicks(plot) {
+    let press = null, place = null;
+    plot.addEventListener("pointerdown", event => { press = event; place = null; }, true);
+    addEventListener("pointerup", event => {
+      if (press && Math.hypot(event.clientX - press.clientX, event.clientY - press.clientY) < 4) setTimeout(() => place && showIndex(...place), 50);
+      press = null;
+    }, true);
+    plot.on("plotly_click", ({ points: [point] }) => {
       const index = point.data.index?.[point.pointNumber];
-      if (index !== undefined && index !== null) showIndex(point.data.meta, index);
+      if (index !== undefined && index !== null) place = [point.data.meta, index];
     });
   }
 
