@@ -146,6 +146,9 @@ class Place:
                 check=False,
                 stderr=subprocess.DEVNULL,
             )
+        # Object files of a build that runs at the same time: the compiler writes into them.
+        for part in (self._target / "release" / "deps").glob("*.rcgu.o"):
+            part.unlink()
         self.environment["CARGO_TARGET_DIR"] = str(self._target)
         return self._target
 
