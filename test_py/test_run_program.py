@@ -271,7 +271,7 @@ def test_errors_of_files_contain_no_text_of_them(programs: Follow, folder: Path)
     process = programs.drive.process
     assert process is not None
     programs.drive.wait_for(lambda: process.output().lower().count("secretword") >= 2, 10, "reasons on stderr")
-    programs.drive.wait_for(lambda: any("caller.nc" in log.msg for log in published), 10, "log on /rosout")
+    programs.drive.wait_for(lambda: any("sub.ngc:2: invalid" in log.msg for log in published), 10, "log on /rosout")
     assert not any("secret" in log.msg.lower() for log in published)
 
 
