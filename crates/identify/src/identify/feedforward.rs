@@ -170,7 +170,6 @@ mod tests {
             name: String::new(),
             period,
             renewal: None,
-            setpoint_cycles: None,
             cutoff: 100.0,
             trace_filter: None,
             torque_constant: None,

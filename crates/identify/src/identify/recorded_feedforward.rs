@@ -139,7 +139,6 @@ mod tests {
             name,
             period,
             renewal: None,
-            setpoint_cycles: None,
             cutoff: (0.16 / period).min(100.0),
             trace_filter: None,
             torque_constant: None,

@@ -103,9 +103,6 @@ pub(super) fn stride(period: f64, tsp: f64) -> Option<usize> {
 /// Returns the longest position cycle, s, that the recorded setpoints permit, and true if it is certain: setpoints that
 /// are held for several samples show their cycle, others change at least with each sample.
 pub(super) fn longest_cycle(signals: &Signals) -> (f64, bool) {
-    if let Some(cycles) = signals.setpoint_cycles {
-        return (cycles.period, true);
-    }
     let holds = |tsp: f64| {
         let mut is_moving = false;
         let all = signals.spans.iter().filter_map(|span| span.psec.as_ref()).all(|psec| {
@@ -175,7 +172,6 @@ mod tests {
             name: String::new(),
             period: 1e-3,
             renewal: None,
-            setpoint_cycles: None,
             cutoff: 100.0,
             trace_filter: None,
             torque_constant: None,
@@ -207,7 +203,6 @@ mod tests {
             name: String::new(),
             period: 4e-3,
             renewal: None,
-            setpoint_cycles: None,
             cutoff: 100.0,
             trace_filter: None,
             torque_constant: None,

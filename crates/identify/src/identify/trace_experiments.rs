@@ -17,8 +17,6 @@ const SETTLING: f64 = 0.3;
 /// Samples before the end of a span that are left out: if it ends in motion, the interpolation errs there by the
 /// unknown curvature, half as much with each sample from the end.
 const ENDING: usize = 6;
-/// Relative tolerance of equal position cycles.
-const GRID: f64 = 1e-6;
 /// Shortest span that is simulated, s.
 const SHORTEST: f64 = 1.0;
 
@@ -51,10 +49,6 @@ pub(super) fn trace_experiments(
         };
         let spline = BandLimitedSpline::new(knots, distance);
         let [start, velocity] = spline.at(0.0);
-        // Time of the first knot behind the beginning of a position cycle, where the setpoints show it.
-        let shown = signals.setpoint_cycles.filter(|cycles| (cycles.period - tsp).abs() < GRID * tsp);
-        let behind = shown.map_or(0.0, |cycles| (span.start - cycles.begin).rem_euclid(tsp));
-        let before = before + behind;
         let end = before + (knots.len() - 1) as f64 * distance;
         let cycles = (end / tsp).ceil() as usize + 1;
         let setpoint = |k: usize| {

@@ -4,7 +4,7 @@ use super::current_lag::{self, HIGHEST_LAG, LOWEST_LAG};
 use super::filter::{GaussianFilter, MAX_CUTOFF_PERIOD, default_cutoff, deviation};
 use super::filtered_section::FilteredSection;
 use super::full_turns::without_resets;
-use super::held_samples::{with_interpolated_setpoints, with_stamps_of_renewals, without_held_samples};
+use super::held_samples::{with_stamps_of_renewals, without_held_samples};
 use super::ordering::{drop_copies, sort_samples};
 use super::spans::{
     CHANNELS, CURRENT, NAMES, POSITION, PSEC, channels, extract_sections, is_smoother_over_stamps,
@@ -94,9 +94,6 @@ pub fn condition(
     let is_held = renewed.is_some();
     let (stamped, renewal) = with_stamps_of_renewals(raw, &mut findings).unzip();
     let raw = stamped.as_ref().unwrap_or(raw);
-    let smooth = if stamped.is_none() { with_interpolated_setpoints(raw, &mut findings) } else { None };
-    let (smooth, setpoint_cycles) = smooth.unzip();
-    let raw = smooth.as_ref().unwrap_or(raw);
     let mut ordered = sort_samples(raw, &mut findings)?;
     let mut columns = usable_columns(raw, &mut findings);
     let position = columns[POSITION].as_ref();
@@ -150,17 +147,7 @@ pub fn condition(
     let (name, torque_constant) = (raw.name.clone(), raw.torque_constant());
     let renewal = renewal.or(is_held.then_some(period));
     Ok((
-        Signals {
-            name,
-            period,
-            renewal,
-            setpoint_cycles,
-            cutoff,
-            trace_filter,
-            torque_constant,
-            current_lag,
-            spans,
-        },
+        Signals { name, period, renewal, cutoff, trace_filter, torque_constant, current_lag, spans },
         findings,
     ))
 }

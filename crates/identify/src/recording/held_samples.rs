@@ -1,6 +1,6 @@
 //! Samples that a logger repeats, since it samples faster than the control renews its signals.
 
-use super::{Finding, RawRecording, SetpointCycles};
+use super::{Finding, RawRecording};
 use virtual_axes_core::statistics::{mean, median};
 use virtual_axes_core::units::{MILLISECOND, Rounded};
 
@@ -15,8 +15,6 @@ const PHASES: i64 = 12;
 /// Roughness of the position over the instants at which it is renewed, relative to that over the stamps, from which on
 /// the samples are those of these instants.
 const SMOOTHER: f64 = 0.3;
-/// Roughness relative to the least one up to which phases are alike.
-const ALIKE: f64 = 1.01;
 /// Largest mean distance of the stamps from uniform ones, in sampling periods.
 const JITTER: f64 = 0.1;
 /// Fewest samples that show it, and most that are compared.
@@ -67,160 +65,59 @@ fn rows_of(raw: &RawRecording, kept: &[usize]) -> RawRecording {
     }
 }
 
-/// Instants at which the control renews a signal, if the samples do not follow them.
-struct Renewals {
-    /// Sampling period, s.
-    period: f64,
-    /// Instants of the samples by the period, and of the renewals whose values they show, s from the first sample.
-    nominal: Vec<f64>,
-    stamps: Vec<f64>,
-    /// Period of the renewals, and time of the first sample behind one, s.
-    cycle: f64,
-    phase: f64,
-}
-
-impl Renewals {
-    /// Searches the renewals over which `signal` is much smoother than over the stamps.
-    fn of(time: &[f64], signal: Option<&Vec<f64>>) -> Option<Self> {
-        let signal = signal.filter(|signal| signal.len() == time.len())?;
-        let mut intervals: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let period = median(&mut intervals).filter(|period| *period > 0.0)?;
-        let period = (period / STEP).round() * STEP;
-        if period <= 0.0 || time.iter().any(|time| !time.is_finite()) {
-            return None;
-        }
-        let nominal: Vec<f64> = time.iter().map(|at| ((at - time[0]) / period).round() * period).collect();
-        let apart = time.iter().zip(&nominal).map(|(at, slot)| (at - time[0] - slot).abs());
-        if mean(&apart.collect::<Vec<f64>>())? > JITTER * period {
-            return None;
-        }
-        let shown = &nominal[..nominal.len().min(COMPARED)];
-        let (before, count) = roughness(shown.iter().copied(), signal, f64::INFINITY)?;
-        if count < FEWEST {
-            return None;
-        }
-        let renewed = |cycle: f64, phase: f64| {
-            move |time: &f64| ((time + phase) / cycle + 1e-6).floor() * cycle - phase
-        };
-        let cycles = (2..=LONGEST_CYCLE).map(|cycle| cycle as f64 * MILLISECOND).filter(|cycle| {
-            let part = (period / cycle).fract();
-            part.min(1.0 - part) > MOVED
-        });
-        let mut least = SMOOTHER * before;
-        let mut found = None;
-        for (cycle, k) in cycles.flat_map(|cycle| (0..PHASES).map(move |k| (cycle, k))) {
-            let phase = k as f64 / PHASES as f64 * cycle;
-            if let Some((sum, _)) = roughness(shown.iter().map(renewed(cycle, phase)), signal, least) {
-                (least, found) = (sum, Some((cycle, phase)));
-            }
-        }
-        let (cycle, first) = found?;
-        let phase = middle_phase(cycle, first, |phase| {
-            let sum = roughness(shown.iter().map(renewed(cycle, phase)), signal, f64::INFINITY);
-            sum.is_some_and(|(sum, _)| sum <= ALIKE * least)
-        });
-        let stamps = nominal.iter().map(renewed(cycle, phase)).collect();
-        Some(Self { period, nominal, stamps, cycle, phase })
-    }
-
-    /// Returns the samples that show a value for the first time.
-    fn first_samples(&self) -> Vec<usize> {
-        (0..self.stamps.len()).filter(|k| *k == 0 || self.stamps[*k] > self.stamps[k - 1]).collect()
-    }
-
-    /// Returns a signal at the instants of the samples, interpolated between the renewals.
-    fn interpolated(&self, signal: &[f64]) -> Vec<f64> {
-        let points: Vec<(f64, f64)> =
-            self.first_samples().into_iter().map(|k| (self.stamps[k], signal[k])).collect();
-        let value = |at: &f64| {
-            let next = points.partition_point(|(stamp, _)| stamp <= at);
-            let from = next.saturating_sub(2).min(points.len().saturating_sub(4));
-            let near = &points[from..points.len().min(from + 4)];
-            // A cubic is far off beside a gap.
-            let is_gap = near.windows(2).any(|pair| pair[1].0 - pair[0].0 > GAP * self.period);
-            let pair = next.saturating_sub(1).min(points.len().saturating_sub(2));
-            lagrange(if is_gap { &points[pair..points.len().min(pair + 2)] } else { near }, *at)
-        };
-        self.nominal.iter().map(value).collect()
-    }
-}
-
-/// Returns the middle of the phases around `first` that the samples show alike.
-fn middle_phase(cycle: f64, first: f64, is_alike: impl Fn(f64) -> bool) -> f64 {
-    let step = cycle / PHASES as f64;
-    let reach = |sign: f64| {
-        let alike = (1..PHASES)
-            .map(|k| sign * k as f64 * step)
-            .take_while(|by| is_alike((first + by).rem_euclid(cycle)));
-        alike.last().unwrap_or(0.0)
-    };
-    (first + 0.5 * (reach(1.0) + reach(-1.0))).rem_euclid(cycle)
-}
-
-/// Returns the polynomial through `points` (instant, value) at an instant.
-fn lagrange(points: &[(f64, f64)], at: f64) -> f64 {
-    let weight = |k: usize| {
-        let others = (0..points.len()).filter(|j| *j != k);
-        others.map(|j| (at - points[j].0) / (points[k].0 - points[j].0)).product::<f64>()
-    };
-    points.iter().enumerate().map(|(k, (_, value))| weight(k) * value).sum()
-}
-
 /// Returns the recording with the stamps of the instants at which the control renews its signals, and the period of these, s, if
 /// the samples do not follow them and the position is much smoother over them; none otherwise.
 pub(super) fn with_stamps_of_renewals(
     raw: &RawRecording,
     findings: &mut Vec<Finding>,
 ) -> Option<(RawRecording, f64)> {
-    let renewals = Renewals::of(&raw.time, raw.position.as_ref())?;
+    let position = raw.position.as_ref().filter(|position| position.len() == raw.time.len())?;
+    let mut intervals: Vec<f64> = raw.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let period = median(&mut intervals).filter(|period| *period > 0.0)?;
+    let period = (period / STEP).round() * STEP;
+    if period <= 0.0 || raw.time.iter().any(|time| !time.is_finite()) {
+        return None;
+    }
+    let slots: Vec<f64> = raw.time.iter().map(|time| ((time - raw.time[0]) / period).round()).collect();
+    let nominal: Vec<f64> = slots.iter().map(|slot| slot * period).collect();
+    let apart = raw.time.iter().zip(&nominal).map(|(time, slot)| (time - raw.time[0] - slot).abs());
+    if mean(&apart.collect::<Vec<f64>>())? > JITTER * period {
+        return None;
+    }
+    let shown = &nominal[..nominal.len().min(COMPARED)];
+    let (before, count) = roughness(shown.iter().copied(), position, f64::INFINITY)?;
+    if count < FEWEST {
+        return None;
+    }
+    let renewed =
+        |cycle: f64, phase: f64| move |time: &f64| ((time + phase) / cycle + 1e-6).floor() * cycle - phase;
+    let cycles = (2..=LONGEST_CYCLE).map(|cycle| cycle as f64 * MILLISECOND).filter(|cycle| {
+        let part = (period / cycle).fract();
+        part.min(1.0 - part) > MOVED
+    });
+    let mut least = SMOOTHER * before;
+    let mut found = None;
+    for (cycle, k) in cycles.flat_map(|cycle| (0..PHASES).map(move |k| (cycle, k))) {
+        let phase = k as f64 / PHASES as f64 * cycle;
+        if let Some((sum, _)) = roughness(shown.iter().map(renewed(cycle, phase)), position, least) {
+            (least, found) = (sum, Some((cycle, phase)));
+        }
+    }
+    let (cycle, phase) = found?;
     findings.push(Finding::note(
         "held-samples",
         format!(
             "{}: the signals are renewed every {} ms, which the samples every {} ms do not follow: the samples are taken as \
              those of the renewals",
             raw.name,
-            Rounded(renewals.cycle / MILLISECOND),
-            Rounded(renewals.period / MILLISECOND)
+            Rounded(cycle / MILLISECOND),
+            Rounded(period / MILLISECOND)
         ),
     ));
-    let kept = renewals.first_samples();
-    let time = kept.iter().map(|k| raw.time[0] + renewals.stamps[*k]).collect();
-    Some((RawRecording { time, ..rows_of(raw, &kept) }, renewals.cycle))
-}
-
-/// Returns the recording with setpoints interpolated between the position cycles, and these cycles, if the control holds its
-/// setpoints for cycles that are shorter than the sampling period and no fraction of it; none otherwise.
-pub(super) fn with_interpolated_setpoints(
-    raw: &RawRecording,
-    findings: &mut Vec<Finding>,
-) -> Option<(RawRecording, SetpointCycles)> {
-    let renewals = Renewals::of(&raw.time, raw.psec.as_ref())?;
-    // The samples show each cycle that is longer.
-    if renewals.cycle > renewals.period {
-        return None;
-    }
-    findings.push(Finding::note(
-        "held-setpoints",
-        format!(
-            "{}: the setpoints are renewed every {} ms, which the samples every {} ms do not follow: they are interpolated \
-             between the renewals",
-            raw.name,
-            Rounded(renewals.cycle / MILLISECOND),
-            Rounded(renewals.period / MILLISECOND)
-        ),
-    ));
-    let setpoint = |channel: &Option<Vec<f64>>| {
-        let whole = channel.as_ref().filter(|channel| channel.len() == raw.time.len());
-        whole.map(|channel| renewals.interpolated(channel)).or_else(|| channel.clone())
-    };
-    let recording = RawRecording {
-        psec: setpoint(&raw.psec),
-        velocity_feedforward: setpoint(&raw.velocity_feedforward),
-        torque_feedforward: setpoint(&raw.torque_feedforward),
-        ..raw.clone()
-    };
-    let begin = raw.time.first()? - renewals.phase;
-    Some((recording, SetpointCycles { period: renewals.cycle, begin }))
+    let stamps: Vec<f64> = nominal.iter().map(renewed(cycle, phase)).collect();
+    let kept: Vec<usize> = (0..stamps.len()).filter(|k| *k == 0 || stamps[*k] > stamps[k - 1]).collect();
+    let time = kept.iter().map(|k| raw.time[0] + stamps[*k]).collect();
+    Some((RawRecording { time, ..rows_of(raw, &kept) }, cycle))
 }
 
 /// Returns the sum of the distances of the position from a cubic through the four samples around each, and their number; none if
@@ -244,7 +141,15 @@ fn roughness(stamps: impl Iterator<Item = f64>, position: &[f64], limit: f64) ->
         if e.0 - a.0 > GAP * (c.0 - b.0).min(d.0 - c.0) || e.1 == a.1 {
             continue;
         }
-        sum += (c.1 - lagrange(&[a, b, d, e], c.0)).abs();
+        let around = [a, b, d, e];
+        let cubic: f64 = (0..4)
+            .map(|k| {
+                let others = (0..4).filter(|j| *j != k);
+                let weight: f64 = others.map(|j| (c.0 - around[j].0) / (around[k].0 - around[j].0)).product();
+                weight * around[k].1
+            })
+            .sum();
+        sum += (c.1 - cubic).abs();
         count += 1;
         if sum >= limit {
             return None;
@@ -322,35 +227,6 @@ mod tests {
             let high = shifts.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             assert!(high - low < 0.1e-3 && low > -cycle, "{period}: {low} to {high}");
             assert!(found.time.windows(2).all(|pair| pair[1] > pair[0] + 0.9 * cycle), "{period}");
-        }
-    }
-
-    #[test]
-    fn setpoints_that_the_samples_do_not_follow_are_interpolated_between_their_cycles() {
-        for (cycle, period, phase) in [(6e-3, 10e-3, 2e-3), (4e-3, 10e-3, 1e-3), (6e-3, 20e-3, 5e-3)] {
-            let (raw, at) = held(cycle, period, phase);
-            let position = raw.time.iter().map(|time| at(*time - 0.015)).collect();
-            let recorded = raw.position.clone();
-            let raw = RawRecording { psec: raw.position, position: Some(position), ..raw };
-            assert!(with_stamps_of_renewals(&raw, &mut Vec::new()).is_none(), "{period}");
-            let (found, cycles) = with_interpolated_setpoints(&raw, &mut Vec::new()).expect("cycles");
-            assert_eq!((&found.position, &found.time), (&raw.position, &raw.time));
-            assert!((cycles.period - cycle).abs() < 1e-9, "{period}: {}", cycles.period);
-            // The samples bound the phase to the distances that occur, of which the cycle and the period have a common one.
-            let behind = raw.time[0] - cycles.begin;
-            assert!((behind - phase).abs() <= 2e-3 && (0.0..cycle).contains(&behind), "{period}: {behind}");
-            // A constant delay by the remaining phase is left, not the steps of up to a cycle.
-            let deviations = |setpoints: &[f64]| {
-                let delay = phase - behind;
-                let pairs = raw.time.iter().zip(setpoints);
-                let within = pairs.take(490).map(|(time, value)| (value - at(*time - delay)).abs());
-                within.fold(0.0, f64::max)
-            };
-            let (before, after) = (
-                deviations(recorded.as_ref().expect("held")),
-                deviations(found.psec.as_ref().expect("setpoints")),
-            );
-            assert!(after < 1e-5 && before > 50.0 * after, "{period}: {before} to {after}");
         }
     }
 

@@ -26,5 +26,5 @@ pub use error::ConditioningError;
 pub(crate) use filter::deviation;
 pub use filter::{FilteredSignal, GaussianFilter};
 pub use finding::{Finding, Severity};
-pub use signals::{RawRecording, SetpointCycles, SignalSpan, Signals};
+pub use signals::{RawRecording, SignalSpan, Signals};
 pub use stated::StatedValues;

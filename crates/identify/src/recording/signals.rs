@@ -49,15 +49,6 @@ impl RawRecording {
     }
 }
 
-/// Position cycles for which the control holds its setpoints.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SetpointCycles {
-    /// Period, s.
-    pub period: f64,
-    /// Beginning of a cycle on the time axis of the recording, s.
-    pub begin: f64,
-}
-
 /// Conditioned recording: uniform sampling within each span, with zero-phase derivatives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signals {
@@ -68,8 +59,6 @@ pub struct Signals {
     /// Period at which the control renews its signals, s, if the samples show it: repeated ones, or ones that move smoothly at
     /// the instants of the renewals only.
     pub renewal: Option<f64>,
-    /// Position cycles of setpoints that are interpolated between them, if the samples show them but do not follow them.
-    pub setpoint_cycles: Option<SetpointCycles>,
     /// Cut-off frequency (half power) of the filter of velocity, acceleration and smoothed current, Hz.
     pub cutoff: f64,
     /// Half-power frequency, Hz, of the low-pass filter of the control that all signals but PSEC have passed.
